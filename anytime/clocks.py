@@ -1,0 +1,84 @@
+"""Time: one clock for thinking and acting, and deadlines upon it."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from typing import Protocol
+
+from anytime.errors import AnytimeError
+from anytime.machines import Machine
+
+
+class Clock(Protocol):
+    """What tells the time, and what thinking costs on it."""
+
+    def now(self) -> float:
+        """Seconds since the clock's origin; never decreases."""
+        ...
+
+    def spend(self, module: str, work: float, step: int | None) -> None:
+        """Account for `work` units of `module`; `step` is its index if it does not count its own."""
+        ...
+
+
+class WallClock:
+    """Real time. Work takes as long as it takes."""
+
+    def now(self) -> float:
+        return time.perf_counter()
+
+    def spend(self, module: str, work: float, step: int | None) -> None:
+        """Nothing to do: real time has passed already."""
+
+
+class WorkClock:
+    """Simulated time, which advances by each module's own rate on a given machine.
+
+    A mission on a work clock, its decisions and its bugs repeat bit for bit, and faster than
+    real time. Whoever acts instead of thinking calls `advance`.
+    """
+
+    def __init__(self, machine: Machine, start: float = 0.0) -> None:
+        self.machine = machine
+        self._now = start
+
+    def now(self) -> float:
+        return self._now
+
+    def spend(self, module: str, work: float, step: int | None) -> None:
+        self._now += self.machine.seconds(module, work, step)
+
+    def advance(self, seconds: float) -> None:
+        """Let `seconds` pass. Raises AnytimeError for a negative or non-finite time."""
+        if not 0 <= seconds < math.inf:
+            raise AnytimeError(f"time cannot advance by {seconds} s; give a finite number >= 0")
+        self._now += seconds
+
+
+@dataclass(frozen=True)
+class Deadline:
+    """An absolute time on one clock. `inf` is no deadline; one that has passed means stop now."""
+
+    clock: Clock
+    at: float = math.inf
+
+    @classmethod
+    def after(cls, seconds: float, clock: Clock | None = None) -> Deadline:
+        """The deadline `seconds` from now; zero or negative means stop now, never "no limit"."""
+        if math.isnan(seconds):
+            raise AnytimeError("seconds is NaN; give the time that may be spent, 0 = stop now")
+        clock = clock or WallClock()
+        return cls(clock, clock.now() + seconds)
+
+    def remaining(self) -> float:
+        """Seconds left, negative when it has passed."""
+        return self.at - self.clock.now()
+
+    def expired(self) -> bool:
+        return self.clock.now() >= self.at
+
+    def sooner(self, seconds: float) -> Deadline:
+        """This deadline or the one `seconds` from now, whichever comes first."""
+        return Deadline(self.clock, min(self.at, self.clock.now() + seconds))

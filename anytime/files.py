@@ -1,0 +1,147 @@
+"""Files that are whole or absent: atomic writing, strict JSON with a checksum."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import msgspec
+
+from anytime.errors import AnytimeError
+
+LARGEST = 256 * 2**20  # bytes of a file that we are ready to parse
+
+
+class Stored(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """What every stored struct derives from: unknown fields are refused."""
+
+
+Record = TypeVar("Record", bound=Stored)
+
+
+def write_atomically(path: Path, content: bytes) -> None:
+    """Write a file so that a crash leaves the old one or the new one, never a mixture."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def write_record(path: Path, schema: str, record: Stored) -> None:
+    """Write a struct as JSON: sorted keys, one row of a list a line, no NaN, a checksum.
+
+    Raises AnytimeError when a number in it is not finite; the old file then stays.
+    """
+    content = msgspec.to_builtins(record)
+    _refuse_non_finite(content, "$", path)
+    content = {"schema": schema, **content}
+    content["checksum"] = _checksum(content)
+    write_atomically(path, _layout(content).encode())
+
+
+def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
+    """Read a struct written by `write_record`.
+
+    Raises AnytimeError, in one line with the path, for whatever is wrong with the file.
+    """
+    content = read_json(path)
+    if not isinstance(content, dict) or "schema" not in content:
+        raise AnytimeError(f"{path}: not one of our files: no 'schema'; expected {schema!r}")
+    if content["schema"] != schema:
+        raise AnytimeError(f"{path}: has schema {content['schema']!r}, needed is {schema!r}")
+    stated = content.pop("checksum", None)
+    if stated != _checksum(content):
+        raise AnytimeError(f"{path}: checksum does not match; the file was cut or edited by hand")
+    del content["schema"]
+    try:
+        return msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        raise AnytimeError(f"{path}: {error}") from None
+
+
+def read_json(path: Path) -> Any:
+    """Parse strict JSON: no NaN, no infinity, no key twice. Raises AnytimeError with the path."""
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise AnytimeError(f"{path}: {size} bytes; at most {LARGEST} are read")
+        text = path.read_bytes().decode()
+    except FileNotFoundError:
+        raise AnytimeError(f"{path}: no such file") from None
+    except OSError as error:
+        raise AnytimeError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise AnytimeError(f"{path}: not a text file in UTF-8") from None
+    try:
+        content = json.loads(text, object_pairs_hook=_unique, parse_constant=_refuse_constant)
+    except (json.JSONDecodeError, RecursionError) as error:
+        reason = error.msg if isinstance(error, json.JSONDecodeError) else "nested too deeply"
+        line = f":{error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
+        raise AnytimeError(f"{path}{line}: not JSON: {reason}") from None
+    except ValueError as error:
+        raise AnytimeError(f"{path}: {error}") from None
+    _refuse_non_finite(content, "$", path)
+    return content
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
+
+
+def _layout(content: Mapping[str, Any]) -> str:
+    """One key a line, and in a list of rows one row a line, so that differences read well."""
+    lines: list[str] = []
+    for key in sorted(content):
+        value = content[key]
+        if isinstance(value, list) and value and isinstance(value[0], dict | list):
+            rows = ",\n  ".join(_compact(row) for row in value)
+            lines.append(f"{json.dumps(key)}: [\n  {rows}\n]")
+        else:
+            lines.append(f"{json.dumps(key)}: {_compact(value)}")
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    content = dict(pairs)
+    if len(content) != len(pairs):
+        raise ValueError("a key occurs twice in one object")
+    return content
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number that a file may hold")
+
+
+def _refuse_non_finite(value: Any, where: str, path: Path) -> None:
+    if isinstance(value, float) and not math.isfinite(value):
+        raise AnytimeError(f"{path}: {where} is {value}; numbers must be finite")
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _refuse_non_finite(item, f"{where}.{key}", path)
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            _refuse_non_finite(item, f"{where}[{index}]", path)

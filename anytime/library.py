@@ -1,0 +1,235 @@
+"""The anytime library: profiles by module and the machine they were measured on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from anytime.errors import AnytimeError
+from anytime.files import Stored, read_record, write_record
+from anytime.machines import Machine, Rate
+from anytime.pictures import figure
+from anytime.profiles import Profile, Recording
+
+PROFILE = "anytime.profile/1"
+MACHINE = "anytime.machine/1"
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,99}")
+
+
+class ProfileLibrary(Mapping[str, Profile]):
+    """The profiles of some modules [ZR93 §1], kept in a folder with the machine's rates.
+
+    `ProfileLibrary("profiles")` reads a folder; `save` writes one, each file as a whole.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path | None = None,
+        *,
+        profiles: Mapping[str, Profile] | None = None,
+        machine: Machine | None = None,
+    ) -> None:
+        self.machine = machine or Machine("this")
+        self._profiles = dict(profiles or {})
+        if folder is not None:
+            self._read(Path(folder))
+
+    def __getitem__(self, module: str) -> Profile:
+        if module not in self._profiles:
+            raise KeyError(
+                f"no profile for module {module!r}; "
+                f"measured: {', '.join(sorted(self._profiles)) or 'none'}"
+            )
+        return self._profiles[module]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(self._profiles))
+
+    def __len__(self) -> int:
+        return len(self._profiles)
+
+    def on(self, machine: Machine) -> ProfileLibrary:
+        """These profiles in the seconds of another machine."""
+        moved = {name: profile.on(machine) for name, profile in self._profiles.items()}
+        return ProfileLibrary(profiles=moved, machine=machine)
+
+    def with_profile(self, profile: Profile) -> ProfileLibrary:
+        """This library with one profile added or replaced."""
+        return ProfileLibrary(
+            profiles={**self._profiles, profile.module: profile}, machine=self.machine
+        )
+
+    def save(self, folder: str | Path) -> None:
+        """Write every profile and the machine into a folder, each atomically."""
+        root = Path(folder)
+        for name, profile in self._profiles.items():
+            write_record(root / f"{_checked(name)}.profile", PROFILE, _store(profile))
+        write_record(root / "machine.json", MACHINE, _store_machine(self.machine))
+
+    def _read(self, root: Path) -> None:
+        if not root.is_dir():
+            raise AnytimeError(f"{root}: no such folder; anytime profile … --library {root} makes it")
+        for path in sorted(root.glob("*.profile")):
+            profile = _restore(path)
+            self._profiles[profile.module] = profile
+        if (root / "machine.json").exists():
+            self.machine = read_machine(root / "machine.json")
+
+    def __repr__(self) -> str:
+        head = f"library of {len(self)} profiles, machine {self.machine.name}"
+        return "\n".join([head, *(f"  {self[name]!r}"[:100] for name in self)])
+
+    def _repr_html_(self) -> str:
+        return "".join(self[name]._repr_html_() for name in self) or figure("", repr(self))
+
+
+class _Run(Stored):
+    problem: str
+    call: str
+    inputs: dict[str, float]
+    features: dict[str, float]
+    seconds: list[float]
+    work: list[float]
+    raw: list[float]
+    estimates: list[float] | None
+    end: tuple[float, float]
+    complete: bool
+
+
+class _Profile(Stored):
+    module: str
+    inputs: list[str]
+    machine: str
+    references: dict[str, float]
+    runs: list[_Run]
+
+
+class _Rate(Stored):
+    per_work: float
+    per_step: list[float]
+    p95_over_mean: float
+    steps: int
+
+
+class _Machine(Stored):
+    name: str
+    rates: dict[str, _Rate]
+
+
+def _checked(name: str) -> str:
+    if not _NAME.fullmatch(name) or ".." in name:
+        raise AnytimeError(f"{name!r} cannot name a file; use letters, digits, _ . - (at most 100)")
+    return name
+
+
+def _store(profile: Profile) -> _Profile:
+    runs = [
+        _Run(
+            problem=run.problem,
+            call=run.call,
+            inputs=dict(run.inputs),
+            features=dict(run.features),
+            seconds=[round(float(s), 9) for s in run.seconds],
+            work=run.work.tolist(),
+            raw=[float(f"{q:.9g}") for q in run.raw],
+            estimates=None
+            if np.isnan(run.estimates).any()
+            else [float(f"{e:.9g}") for e in run.estimates],
+            end=(round(run.end[0], 9), run.end[1]),
+            complete=run.complete,
+        )
+        for run in sorted(
+            profile.recordings, key=lambda run: (run.problem, run.call, sorted(run.inputs.items()))
+        )
+    ]
+    return _Profile(
+        module=profile.module,
+        inputs=list(profile.inputs),
+        machine=profile.machine,
+        references=dict(profile.references),
+        runs=runs,
+    )
+
+
+def _restore(path: Path) -> Profile:
+    stored = read_record(path, PROFILE, _Profile)
+    runs = tuple(_restored_run(path, index, run, stored) for index, run in enumerate(stored.runs))
+    try:
+        return Profile(
+            _checked(stored.module), tuple(stored.inputs), runs, stored.references, stored.machine
+        )
+    except AnytimeError as error:
+        raise AnytimeError(f"{path}: {error}") from None
+
+
+def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recording:
+    def refuse(reason: str) -> AnytimeError:
+        return AnytimeError(f"{path}: runs[{index}]: {reason}")
+
+    count = len(run.seconds)
+    if len(run.work) != count or len(run.raw) != count:
+        raise refuse("seconds, work and raw differ in length; each registration has all three")
+    if run.estimates is not None and len(run.estimates) != count:
+        raise refuse("estimates and seconds differ in length")
+    for name, column in (("seconds", run.seconds), ("work", run.work)):
+        if any(b < a for a, b in zip(column, column[1:], strict=False)) or (column and column[0] < 0):
+            raise refuse(f"{name} must not decrease or be negative")
+    if min(run.end) < 0:
+        raise refuse("the end of a run cannot be negative")
+    if profile.references:
+        if profile.references.get(run.problem, 0.0) <= 0:
+            raise refuse(f"no positive reference cost for its problem {run.problem!r}")
+        if any(cost < 0 for cost in run.raw):
+            raise refuse("a cost is negative; costs are >= 0")
+    elif any(not 0 <= quality <= 1 for quality in run.raw):
+        raise refuse("a quality lies outside [0, 1]")
+    if set(run.inputs) != set(profile.inputs):
+        raise refuse(f"has inputs {sorted(run.inputs)}, the profile {sorted(profile.inputs)}")
+    if any(not 0 <= quality <= 1 for quality in run.inputs.values()):
+        raise refuse("an input's quality lies outside [0, 1]")
+    return Recording(
+        run.problem,
+        run.call,
+        run.inputs,
+        run.features,
+        np.array(run.seconds, dtype=float),
+        np.array(run.work, dtype=float),
+        np.array(run.raw, dtype=float),
+        np.full(count, np.nan) if run.estimates is None else np.array(run.estimates, dtype=float),
+        run.end,
+        run.complete,
+    )
+
+
+def _store_machine(machine: Machine) -> _Machine:
+    rates = {
+        name: _Rate(
+            per_work=rate.per_work,
+            per_step=list(rate.per_step),
+            p95_over_mean=rate.p95_over_mean,
+            steps=rate.steps,
+        )
+        for name, rate in machine.rates.items()
+    }
+    return _Machine(name=machine.name, rates=rates)
+
+
+def write_machine(path: Path, machine: Machine) -> None:
+    """Write a machine's rates, atomically."""
+    write_record(path, MACHINE, _store_machine(machine))
+
+
+def read_machine(path: Path) -> Machine:
+    """Read a machine's rates. Raises AnytimeError for a negative rate or a broken file."""
+    stored = read_record(path, MACHINE, _Machine)
+    for name, rate in stored.rates.items():
+        if min([rate.per_work, rate.p95_over_mean, *rate.per_step], default=0.0) < 0:
+            raise AnytimeError(f"{path}: rates.{name} has a negative number; seconds are >= 0")
+    rates = {
+        name: Rate(rate.per_work, tuple(rate.per_step), rate.p95_over_mean, rate.steps)
+        for name, rate in stored.rates.items()
+    }
+    return Machine(stored.name, rates)

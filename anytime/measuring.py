@@ -1,0 +1,288 @@
+"""Measuring: running modules on problems, off line, and scoring what they registered."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from anytime.clocks import Clock, Deadline, WallClock
+from anytime.errors import AnytimeError
+from anytime.library import ProfileLibrary
+from anytime.machines import Machine, Rate, charged_rate, stepped_rate
+from anytime.modules import Module
+from anytime.profiles import Profile, Recording
+from anytime.programs import Call, Input, Program, program_of, upstream
+from anytime.running import Change, Result, Run, execute, seed_of
+
+STRATA = 4  # runs of a consumer on one problem, at most
+CHANGES = 64  # registrations kept of one run, at most
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """One run of a call: what it registered, scored afterwards, and what it was fed with."""
+
+    values: tuple[Any, ...]
+    changes: tuple[Change, ...]
+    raw: np.ndarray
+    fed: tuple[tuple[str, _Sample, int], ...]  # parameter, the run that fed it, which result
+    result: Result
+    run: Run
+    features: Mapping[str, float]
+
+
+def measure(
+    what: Module | Program,
+    problems: Iterable[Any],
+    *,
+    seconds: float,
+    clock: Callable[[], Clock] = WallClock,
+    rest: float = 0.0,
+    seed: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+) -> ProfileLibrary:
+    """Measure how the results of a module, or of each module of a program, improve with time.
+
+    problems: objects whose attributes are the inputs by name, plus what `quality` wants.
+    seconds: how long each run may take. clock: makes the clock of a run; a `WorkClock` measures
+    in simulated time. rest: seconds of idling before each run, as a control loop does (profiles
+    measured hot fail in a cold loop). progress: called with (problems done, problems).
+
+    In a program, what each module really delivers feeds the next: at most `STRATA` runs a call
+    and problem, on results equally spaced in achieved quality plus the last; several inputs by
+    Latin square. Quality is scored after the clock has stopped, and a cost is normalised by the
+    cheapest known for its problem when all of its runs are done.
+    Raises AnytimeError for a problem without a needed attribute and for a module without a score.
+    """
+    program = what if isinstance(what, Program) else program_of(what)
+    listed = list(problems)
+    if not listed:
+        raise AnytimeError("no problems to measure on; give at least one")
+    if not seconds > 0:
+        raise AnytimeError(f"seconds={seconds}; give the time that each run may take, > 0")
+    samples: dict[str, dict[str, list[_Sample]]] = {call.label: {} for call in program.calls}
+    keys = _keys(program, listed)
+    for done, (key, problem) in enumerate(zip(keys, listed, strict=True)):
+        for call in program.calls:
+            samples[call.label][key] = [
+                _sample(call, problem, key, fed, seconds, clock, rest, seed)
+                for fed in _feeds(call, key, samples)
+            ]
+        if progress is not None:
+            progress(done + 1, len(listed))
+    return _library(program, keys, samples)
+
+
+def _sample(
+    call: Call,
+    problem: Any,
+    key: str,
+    fed: tuple[tuple[str, _Sample, int], ...],
+    seconds: float,
+    clock: Callable[[], Clock],
+    rest: float,
+    seed: int,
+) -> _Sample:
+    module = call.module
+    by_name = {name: sample.values[index] for name, sample, index in fed}
+    inputs = tuple(
+        by_name[name] if isinstance(argument, Call) else _argument(argument, problem)
+        for name, argument in zip(module.parameters, call.arguments, strict=True)
+    )
+    if rest:
+        import time
+
+        time.sleep(rest)
+    kept: list[Any] = []
+    changes: list[Change] = []
+
+    def observe(value: Any, change: Change) -> None:
+        kept.append(value)
+        changes.append(change)
+        if len(kept) >= 4 * CHANGES:  # bounds the memory of a module that registers for ever
+            del kept[1:-1:2], changes[1:-1:2]
+
+    levels = tuple(index for *_, index in fed)
+    rng = np.random.default_rng(seed_of(seed, call.label, key, levels))
+    deadline = Deadline.after(seconds, clock())
+    result, run = execute(module, inputs, deadline, rng=rng, observe=observe)
+    if run.mixed:
+        raise AnytimeError(
+            f"module {module.name!r} charges work after a check-point that it did not charge for; "
+            "charge before the first yield, register or expired"
+        )
+    if result.fault and not kept:
+        raise AnytimeError(
+            f"module {module.name!r} failed on problem {key} before its first result: {result.fault}"
+        )
+    if len(kept) > CHANGES:
+        chosen = np.unique(np.linspace(0, len(kept) - 1, CHANGES).round().astype(int))
+        kept, changes = [kept[i] for i in chosen], [changes[i] for i in chosen]
+    raw = np.array([_scored(module, value, problem, key) for value in kept])
+    features = module.features(*inputs) if module.features else {}
+    return _Sample(tuple(kept), tuple(changes), raw, fed, result, run, features)
+
+
+def _scored(module: Module, value: Any, problem: Any, key: str) -> float:
+    score = float(module.score(value, problem))
+    if module.quality is not None and not 0 <= score <= 1:
+        raise AnytimeError(
+            f"quality of {module.name!r} is {score} on problem {key}; it must lie in [0, 1]"
+        )
+    if not 0 <= score < float("inf"):
+        raise AnytimeError(
+            f"cost of {module.name!r} is {score} on problem {key}; it must be finite and >= 0"
+        )
+    return score
+
+
+def _argument(argument: Any, problem: Any) -> Any:
+    return getattr(problem, argument.name) if isinstance(argument, Input) else argument.value
+
+
+def _feeds(
+    call: Call, key: str, samples: Mapping[str, Mapping[str, list[_Sample]]]
+) -> list[tuple[tuple[str, _Sample, int], ...]]:
+    """Which results of the calls upstream this call is run on: a Latin square of their strata."""
+    feeding = upstream(call)
+    if not feeding:
+        return [()]
+    columns: list[list[tuple[str, _Sample, int]]] = []
+    for name, source in feeding.items():
+        pool = [
+            (name, sample, index)
+            for sample in samples[source.label][key]
+            for index in range(len(sample.values))
+        ]
+        columns.append(_strata(pool, source.module))
+    if any(not column for column in columns):
+        return []  # nothing arrived, so nothing is run: no result is never extrapolated to
+    count = max(len(column) for column in columns)
+    shifts = np.random.default_rng(seed_of("latin", call.label, key)).permutation(count)
+    return [
+        tuple(
+            column[(row + shifts[place % count] * (place > 0)) % len(column)]
+            for place, column in enumerate(columns)
+        )
+        for row in range(count)
+    ]
+
+
+def _strata(
+    pool: Sequence[tuple[str, _Sample, int]], module: Module
+) -> list[tuple[str, _Sample, int]]:
+    """At most `STRATA` results, equally spaced in achieved quality, and the last one."""
+    if len(pool) <= STRATA:
+        return list(pool)
+    raw = np.array([sample.raw[index] for _, sample, index in pool])
+    quality = raw if module.quality is not None else -raw
+    targets = np.linspace(quality.min(), quality.max(), STRATA - 1)
+    nearest = [int(np.argmin(np.abs(quality - target))) for target in targets]
+    return [pool[index] for index in sorted({*nearest, len(pool) - 1})]
+
+
+def _library(
+    program: Program, keys: Sequence[str], samples: Mapping[str, Mapping[str, list[_Sample]]]
+) -> ProfileLibrary:
+    references: dict[str, dict[str, float]] = {}
+    for call in program.calls:
+        if call.module.quality is not None:
+            continue
+        best = references.setdefault(call.module.name, {})
+        for key, runs in samples[call.label].items():
+            costs = [float(cost) for run in runs for cost in run.raw if cost > 0]
+            if costs:
+                best[key] = min([*costs, best.get(key, float("inf"))])
+
+    def quality(source: Call, key: str, sample: _Sample, index: int) -> float:
+        raw = float(sample.raw[index])
+        if source.module.quality is not None:
+            return raw
+        return 1.0 if raw == 0 else min(1.0, references[source.module.name][key] / raw)
+
+    profiles: dict[str, Profile] = {}
+    rates: dict[str, Rate] = {}
+    for call in program.calls:
+        feeding, recordings = upstream(call), []
+        for key, runs in samples[call.label].items():
+            for sample in runs:
+                inputs = {
+                    name: quality(feeding[name], key, fed, index) for name, fed, index in sample.fed
+                }
+                recordings.append(_recording(call, key, sample, inputs))
+        name = call.module.name
+        known = profiles.get(name)
+        if known is not None and recordings:
+            profiles[name] = replace(known, recordings=(*known.recordings, *recordings))
+        elif recordings:
+            best = {k: v for k, v in references.get(name, {}).items()}
+            profiles[name] = Profile(name, tuple(feeding), tuple(recordings), best)
+        rates[name] = _rate([run for runs in samples[call.label].values() for run in runs])
+    return ProfileLibrary(profiles=profiles, machine=Machine("this", rates))
+
+
+def _recording(call: Call, key: str, sample: _Sample, inputs: Mapping[str, float]) -> Recording:
+    changes = sample.changes
+    return Recording(
+        key,
+        call.label,
+        inputs,
+        {name: float(value) for name, value in sample.features.items()},
+        np.array([change.seconds for change in changes]),
+        np.array([change.work for change in changes], dtype=float),
+        sample.raw,
+        np.array([np.nan if c.estimate is None else c.estimate for c in changes]),
+        (sample.result.elapsed, sample.result.work),
+        bool(sample.result.status.name == "COMPLETE"),
+    )
+
+
+def _rate(runs: Sequence[_Sample]) -> Rate:
+    """Seconds per work from the runs: per unit if the module counts its own, else per step."""
+    if not runs:
+        return Rate()
+    if any(sample.run.charges for sample in runs):
+        pieces: list[tuple[float, float]] = []
+        for sample in runs:
+            marks = [(0.0, 0.0), *((c.work, c.seconds) for c in sample.changes)]
+            marks.append((sample.result.work, sample.result.elapsed))
+            pieces += [(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(marks)]
+        return charged_rate(pieces)
+    return stepped_rate(
+        (step, took) for sample in runs for step, took in enumerate(sample.run.step_seconds)
+    )
+
+
+def _keys(program: Program, problems: Sequence[Any]) -> list[str]:
+    """A key for each problem: its name, or a hash of its inputs; equal problems are numbered."""
+    keys: list[str] = []
+    for problem in problems:
+        missing = [name for name in program.inputs if not hasattr(problem, name)]
+        if missing:
+            raise AnytimeError(
+                f"problems[{len(keys)}] has no .{missing[0]}; the inputs of {program.name} are "
+                f"{', '.join(program.inputs)}"
+            )
+        name = getattr(problem, "name", None)
+        key = name if isinstance(name, str) else _digest(program, problem)
+        count = sum(known == key or known.startswith(f"{key}#") for known in keys)
+        keys.append(key if not count else f"{key}#{count + 1}")
+    return keys
+
+
+def _digest(program: Program, problem: Any) -> str:
+    digest = hashlib.blake2b(digest_size=8)
+    for name in program.inputs:
+        value = getattr(problem, name)
+        try:
+            array = np.asarray(value)
+            plain = array.dtype != object
+        except (ValueError, TypeError):
+            plain = False
+        digest.update(np.ascontiguousarray(array).tobytes() if plain else type(value).__name__.encode())
+    return digest.hexdigest()

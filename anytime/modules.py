@@ -1,0 +1,151 @@
+"""Modules: what improves its result while it is given time."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from anytime import programs
+from anytime.errors import AnytimeError
+
+Score = Callable[..., float]
+FILLED = ("seconds", "rng", "memory")
+
+
+@dataclass(frozen=True, eq=False)
+class Module:
+    """An anytime module, made by the decorator `anytime.module`.
+
+    name: the key of its profile.
+    function: a generator (`yield` registers a result, a bare `yield` is a check-point, `return`
+        completes), or a plain function that calls `anytime.register` and `anytime.expired`.
+    parameters: names of its positional parameters; profiles are conditioned on them.
+    filled: the keyword-only parameters among `seconds`, `rng`, `memory`, which a run fills in.
+    quality, cost: called with (result, problem), or (result), off line and never on the clock.
+    estimate: called with (result); what may be seen of its quality at run time.
+    problems: called with (rng), yields problems to measure on; the command line uses it.
+    features: called with the inputs; named properties of them to condition the profile on.
+    """
+
+    name: str
+    function: Callable[..., Any]
+    parameters: tuple[str, ...]
+    filled: frozenset[str] = frozenset()
+    quality: Score | None = None
+    cost: Score | None = None
+    estimate: Score | None = None
+    problems: Callable[..., Any] | None = None
+    features: Callable[..., Mapping[str, float]] | None = None
+    generator: bool = False
+
+    @property
+    def contract(self) -> bool:
+        """Whether it must be told its time in advance (it has a parameter `seconds`)."""
+        return "seconds" in self.filled
+
+    def score(self, result: object, problem: object) -> float:
+        """The raw quality or cost of a result, from the truth. Only off line."""
+        function = self.quality or self.cost
+        if function is None:
+            raise AnytimeError(
+                f"module {self.name!r} cannot be scored; give @anytime.module(quality=…) or (cost=…)"
+            )
+        return function(result, problem) if _takes_two(function) else function(result)
+
+    def __call__(self, *arguments: object) -> Any:
+        opened = programs.being_read()
+        if opened is None:
+            from anytime.running import call_inside
+
+            return call_inside(self, arguments)
+        if len(arguments) != len(self.parameters):
+            raise AnytimeError(
+                f"program {opened.program!r} calls {self.name} with {len(arguments)} arguments; "
+                f"it takes {len(self.parameters)}: {', '.join(self.parameters)}"
+            )
+        return opened.call(self, arguments)
+
+    def __repr__(self) -> str:
+        kind = "contract module" if self.contract else "module"
+        return f"<{kind} {self.name}({', '.join(self.parameters)})>"
+
+
+def module(
+    *,
+    quality: Score | None = None,
+    cost: Score | None = None,
+    estimate: Score | None = None,
+    problems: Callable[..., Any] | None = None,
+    features: Callable[..., Mapping[str, float]] | None = None,
+    name: str | None = None,
+) -> Callable[[Callable[..., Any]], Module]:
+    """Make an anytime module of a generator or of a function with callbacks.
+
+    quality: (result, problem) or (result) -> [0, 1], the truth, used off line only.
+    cost: the same, any number >= 0; quality is then cheapest known for this problem / this one.
+    estimate: (result) -> [0, 1], what may be seen at run time.
+    problems: (rng) -> an iterable of problems, for `anytime profile`.
+    features: (*inputs) -> named numbers that tell easy inputs from hard ones.
+    Raises AnytimeError for a signature that cannot be run.
+    """
+    if quality is not None and cost is not None:
+        raise AnytimeError("a module has a quality or a cost, not both; drop one of them")
+    if callable(quality) and isinstance(quality, Module):
+        raise AnytimeError("quality must be a plain function, not a module")
+
+    def decorate(function: Callable[..., Any]) -> Module:
+        label = name or function.__name__
+        positional, filled = _signature(label, function)
+        is_generator = inspect.isgeneratorfunction(function)
+        return Module(
+            label,
+            function,
+            positional,
+            filled,
+            quality,
+            cost,
+            estimate,
+            problems,
+            features,
+            is_generator,
+        )
+
+    return decorate
+
+
+def _signature(name: str, function: Callable[..., Any]) -> tuple[tuple[str, ...], frozenset[str]]:
+    positional: list[str] = []
+    filled: set[str] = set()
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
+            raise AnytimeError(
+                f"module {name!r} has *{parameter.name}; name its inputs one by one, "
+                "because profiles are conditioned on them by name"
+            )
+        if parameter.kind is not parameter.KEYWORD_ONLY:
+            positional.append(parameter.name)
+        elif parameter.name in FILLED:
+            filled.add(parameter.name)
+        elif parameter.default is parameter.empty:
+            raise AnytimeError(
+                f"module {name!r} has the keyword-only parameter {parameter.name!r}, which nothing "
+                f"fills in; filled in are {', '.join(FILLED)}"
+            )
+    return tuple(positional), frozenset(filled)
+
+
+def _takes_two(function: Callable[..., Any]) -> bool:
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):  # some built-ins have no signature
+        return False
+    if any(p.kind is p.VAR_POSITIONAL for p in parameters):
+        return True
+    required = [
+        p
+        for p in parameters
+        if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD) and p.default is p.empty
+    ]
+    return len(required) >= 2

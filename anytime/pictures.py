@@ -1,0 +1,117 @@
+"""Pictures of the objects: sparklines for a terminal, inline SVG for a notebook."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+
+BARS = "▁▂▃▄▅▆▇█"
+# Okabe & Ito's colours, told apart by colour-blind eyes; every series is labelled as well.
+COLOURS = ("#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#f0e442", "#000000")
+
+
+def sparkline(values: Sequence[float], low: float = 0.0, high: float = 1.0) -> str:
+    """One character a value; a blank where there is none (NaN)."""
+    span = (high - low) or 1.0
+    marks: list[str] = []
+    for value in values:
+        if math.isnan(value):
+            marks.append(" ")
+            continue
+        share = min(max((value - low) / span, 0.0), 1.0)
+        marks.append(BARS[min(int(share * len(BARS)), len(BARS) - 1)])
+    return "".join(marks)
+
+
+def number(value: float) -> str:
+    """A quality or share in few characters: .81, 1.00, 12.3."""
+    if math.isnan(value):
+        return "—"
+    if abs(value) < 1:
+        text = f"{value:.2f}"
+        return text.replace("0.", ".", 1) if text not in ("0.00", "1.00") else text
+    return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def duration(seconds: float) -> str:
+    """A time in few characters: 79.6 ms, 1.20 s."""
+    if math.isinf(seconds):
+        return "∞"
+    if abs(seconds) < 1e-3:
+        return f"{1e6 * seconds:.0f} µs" if seconds else "0 ms"
+    if abs(seconds) < 1:
+        return f"{1e3 * seconds:.1f} ms"
+    return f"{seconds:.2f} s"
+
+
+def line_chart(
+    series: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    *,
+    x_label: str,
+    y_label: str,
+    bands: Mapping[str, tuple[Sequence[float], Sequence[float], Sequence[float]]] | None = None,
+    dashed: Sequence[str] = (),
+    title: str = "",
+    width: int = 560,
+    height: int = 260,
+    y_range: tuple[float, float] = (0.0, 1.0),
+) -> str:
+    """A chart as inline SVG. series: label -> (x [n], y [n]); bands: label -> (x, low, high)."""
+    bands = bands or {}
+    xs = [x for line in series.values() for x in line[0]] or [0.0, 1.0]
+    x_low, x_high = min(xs), max(xs)
+    x_high = x_high if x_high > x_low else x_low + 1
+    left, right, top, bottom = 48, width - 12, 22 if title else 10, height - 34
+    y_low, y_high = y_range
+
+    def place(x: float, y: float) -> str:
+        across = left + (right - left) * (x - x_low) / (x_high - x_low)
+        up = bottom - (bottom - top) * (min(max(y, y_low), y_high) - y_low) / (y_high - y_low)
+        return f"{across:.1f},{up:.1f}"
+
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" '
+        f'width="{width}" height="{height}" role="img" font-family="sans-serif" font-size="11">',
+        f"<title>{html.escape(title or y_label)}</title>",
+        f'<rect width="{width}" height="{height}" fill="white"/>',
+    ]
+    for tick in range(5):
+        y = y_low + (y_high - y_low) * tick / 4
+        x = x_low + (x_high - x_low) * tick / 4
+        _, up = place(x_low, y).split(",")
+        across, _ = place(x, y_low).split(",")
+        parts.append(f'<path d="M{left},{up}H{right}" stroke="#ddd"/>')
+        parts.append(f'<text x="{left - 5}" y="{up}" text-anchor="end" dy="4">{y:.3g}</text>')
+        parts.append(f'<text x="{across}" y="{bottom + 14}" text-anchor="middle">{x:.3g}</text>')
+    for index, (label, (bx, low, high)) in enumerate(bands.items()):
+        edge = [place(x, y) for x, y in zip(bx, low, strict=True)]
+        edge += [place(x, y) for x, y in zip(reversed(bx), reversed(high), strict=True)]
+        colour = COLOURS[list(series).index(label) if label in series else index % len(COLOURS)]
+        parts.append(f'<polygon points="{" ".join(edge)}" fill="{colour}" opacity="0.18"/>')
+    for index, (label, (x, y)) in enumerate(series.items()):
+        points = " ".join(place(a, b) for a, b in zip(x, y, strict=True) if not math.isnan(b))
+        colour = COLOURS[index % len(COLOURS)]
+        dash = ' stroke-dasharray="5 4"' if label in dashed else ""
+        parts.append(
+            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.8"{dash}/>'
+        )
+        legend = top + 14 + 14 * index
+        parts.append(
+            f'<path d="M{right - 120},{legend - 4}h18" stroke="{colour}" stroke-width="2"{dash}/>'
+            f'<text x="{right - 98}" y="{legend}">{html.escape(label)}</text>'
+        )
+    middle = (left + right) / 2
+    parts.append(f'<text x="{middle}" y="{height - 6}" text-anchor="middle">{html.escape(x_label)}</text>')
+    parts.append(
+        f'<text transform="translate(12 {(top + bottom) / 2}) rotate(-90)" '
+        f'text-anchor="middle">{html.escape(y_label)}</text>'
+    )
+    if title:
+        parts.append(f'<text x="{middle}" y="14" text-anchor="middle">{html.escape(title)}</text>')
+    return "".join([*parts, "</svg>"])
+
+
+def figure(svg: str, text: str) -> str:
+    """A picture with its text form below, which is also what a screen reader reads."""
+    return f'<div>{svg}<pre style="font-size:11px">{html.escape(text)}</pre></div>'

@@ -1,0 +1,335 @@
+"""Conditional performance profiles: how good a result to expect, given time and inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from anytime.errors import AnytimeError
+from anytime.machines import Machine
+from anytime.pictures import duration, figure, line_chart, number, sparkline
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recorded run of a module on one problem.
+
+    inputs: achieved quality of what arrived at each parameter that another module feeds.
+    seconds, work, raw, estimates: [n] at each registration, thinned; raw is the quality, or the
+        cost for a module with a cost; estimates are NaN for a module without one.
+    end: seconds, work when the run ended.
+    """
+
+    problem: str
+    call: str
+    inputs: Mapping[str, float]
+    features: Mapping[str, float]
+    seconds: Floats
+    work: Floats
+    raw: Floats
+    estimates: Floats
+    end: tuple[float, float]
+    complete: bool
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution of quality: values [n] in [0, 1], NaN = no result; weights [n], sum 1."""
+
+    values: Floats
+    weights: Floats
+
+    @property
+    def mean(self) -> float:
+        """Expected quality; no result counts 0."""
+        return float(self.weights @ np.nan_to_num(self.values))
+
+    @property
+    def no_result(self) -> float:
+        """Probability that there is no result at all."""
+        return float(self.weights[np.isnan(self.values)].sum())
+
+    def at_least(self, quality: float) -> float:
+        """Probability of a result of this quality or better."""
+        return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())
+
+    def quantile(self, share: float) -> float:
+        """The quality that a share of the runs stays below; NaN where that is no result."""
+        order = np.argsort(np.nan_to_num(self.values, nan=-1.0), kind="stable")
+        cumulative = np.cumsum(self.weights[order])
+        index = min(int(np.searchsorted(cumulative, share - 1e-12)), len(order) - 1)
+        return float(self.values[order[index]])
+
+
+@dataclass(frozen=True)
+class Profile:
+    """How the quality of a module's results grows with time, given the quality of its inputs.
+
+    A distribution over recorded runs, whose unit is the problem. `given(boxes=.8)` conditions it
+    on the quality at the parameter `boxes`: each problem's runs are interpolated over the input
+    quality and then problems are averaged, because good inputs and easy problems come together.
+    *No result* is a level of its own and is never extrapolated to. [ZR93] §3.5.
+    """
+
+    module: str
+    inputs: tuple[str, ...]
+    recordings: tuple[Recording, ...]
+    references: Mapping[str, float] = field(default_factory=dict)
+    machine: str = "this"
+    condition: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.recordings:
+            raise AnytimeError(
+                f"profile of {self.module!r} has no recorded run; measure it on at least one problem"
+            )
+        for name in self.condition:
+            known = (*self.inputs, *self.features)
+            if name not in known:
+                raise AnytimeError(
+                    f"profile of {self.module!r} is not conditioned on {name!r}; "
+                    f"known: {', '.join(known) or 'nothing'}"
+                )
+
+    # What the runs achieved
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        return tuple(sorted({name for run in self.recordings for name in run.features}))
+
+    @cached_property
+    def problems(self) -> tuple[str, ...]:
+        return tuple(sorted({run.problem for run in self.recordings}))
+
+    @cached_property
+    def qualities(self) -> tuple[Floats, ...]:
+        """True quality at each registration of each run: raw, or cheapest known / raw cost."""
+        if not self.references:
+            return tuple(run.raw for run in self.recordings)
+        result: list[Floats] = []
+        for run in self.recordings:
+            reference = self.references[run.problem]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                quality = np.where(run.raw > 0, reference / run.raw, 1.0)
+            result.append(np.clip(quality, 0.0, 1.0))
+        return tuple(result)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Weight of each run under the condition; every problem has the same weight. Sum 1."""
+        weights = np.zeros(len(self.recordings))
+        for problem in self.problems:
+            members = [i for i, run in enumerate(self.recordings) if run.problem == problem]
+            weights[members] = self._strata(members) * self._alike(members)
+        total = weights.sum()
+        return weights / total if total > 0 else np.full(len(weights), 1 / len(weights))
+
+    def _strata(self, members: list[int]) -> Floats:
+        """Weights of one problem's runs: interpolated over the qualities of their inputs."""
+        asked = [name for name in self.inputs if name in self.condition]
+        if not asked:
+            return np.full(len(members), 1 / len(members))
+        points = np.array([[self.recordings[i].inputs[name] for name in asked] for i in members])
+        target = np.array([self.condition[name] for name in asked])
+        if len(asked) == 1:
+            return _between(points[:, 0], float(target[0]))
+        # Several inputs: Shepard's inverse distance, exact at the runs themselves.
+        distance = np.abs(points - target).sum(axis=1)
+        closeness = 1.0 / np.maximum(distance, 1e-6) ** 2
+        return closeness / closeness.sum()
+
+    def _alike(self, members: list[int]) -> float:
+        """How much this problem counts for the features asked for (a Gaussian kernel)."""
+        weight = 1.0
+        for name in self.features:
+            if name not in self.condition:
+                continue
+            values = np.array([run.features.get(name, np.nan) for run in self.recordings])
+            width = max(float(np.nanstd(values)) * len(self.problems) ** -0.2, 1e-9)
+            own = self.recordings[members[0]].features.get(name, np.nan)
+            weight *= float(np.exp(-0.5 * ((own - self.condition[name]) / width) ** 2)) + 1e-9
+        return weight
+
+    def quality_at(self, seconds: ArrayLike) -> Floats:
+        """Quality of each run at each time, [runs, times]; NaN before its first result."""
+        times = np.atleast_1d(np.asarray(seconds, dtype=float))
+        table = np.full((len(self.recordings), len(times)), np.nan)
+        for row, (run, quality) in enumerate(zip(self.recordings, self.qualities, strict=True)):
+            if not len(quality):
+                continue
+            last = np.searchsorted(run.seconds, times, side="right") - 1
+            table[row] = np.where(last >= 0, quality[np.maximum(last, 0)], np.nan)
+        return table
+
+    @cached_property
+    def times(self) -> Floats:
+        """The moments at which something changes, [at most 512], increasing."""
+        every = np.unique(np.concatenate([[0.0], *(run.seconds for run in self.recordings)]))
+        if len(every) <= 512:
+            return every
+        return every[np.unique(np.linspace(0, len(every) - 1, 512).round().astype(int))]
+
+    # Questions
+
+    def given(self, **condition: float) -> Profile:
+        """This profile under conditions: qualities of inputs by parameter, features by name.
+
+        Raises AnytimeError for a name that it is not conditioned on or a quality outside [0, 1].
+        """
+        for name, value in condition.items():
+            if name in self.inputs and not 0 <= value <= 1:
+                raise AnytimeError(f"given({name}={value}): a quality lies in [0, 1]")
+        return replace(self, condition={**self.condition, **condition})
+
+    def at(self, seconds: float) -> Distribution:
+        """The distribution of quality after `seconds`."""
+        return Distribution(self.quality_at(seconds)[:, 0], self.weights)
+
+    def mean(self, seconds: ArrayLike, *, as_measured: bool = False) -> Floats:
+        """Expected quality after each time, [times]; no result counts 0.
+
+        The monotone envelope (the best expectation with that time or less), or as measured.
+        """
+        times = np.atleast_1d(np.asarray(seconds, dtype=float))
+        measured = self.weights @ np.nan_to_num(self.quality_at(times))
+        if as_measured:
+            return measured
+        knots = np.maximum.accumulate(self.weights @ np.nan_to_num(self.quality_at(self.times)))
+        before = np.searchsorted(self.times, times, side="right") - 1
+        return np.maximum(measured, np.where(before >= 0, knots[np.maximum(before, 0)], 0.0))
+
+    def quantile(self, share: float, seconds: float) -> float:
+        """The quality that a share of the runs stays below; NaN where that is no result."""
+        return self.at(seconds).quantile(share)
+
+    def time_to(self, quality: float, share: float = 0.5) -> float:
+        """Seconds until a share of the runs has reached this quality; inf if it never does."""
+        reached = np.nan_to_num(self.quality_at(self.times), nan=-1.0) >= quality
+        reached = np.maximum.accumulate(reached, axis=1)
+        hits = np.flatnonzero(self.weights @ reached >= share - 1e-12)
+        return float(self.times[hits[0]]) if len(hits) else float("inf")
+
+    def progress(self, quality: float, seconds: float) -> Distribution:
+        """Where a run that has this quality now will be in `seconds` [Hansen & Zilberstein 2001].
+
+        Every moment at which a recorded run had about this quality (the nearest tenth of them)
+        speaks once, weighted by its problem.
+        """
+        starts: list[tuple[float, float, float]] = []
+        for weight, run, values in zip(self.weights, self.recordings, self.qualities, strict=True):
+            for moment, value in zip(run.seconds, values, strict=True):
+                index = int(np.searchsorted(run.seconds, moment + seconds, side="right")) - 1
+                starts.append((abs(value - quality), weight / len(values), values[index]))
+        if not starts:
+            return Distribution(np.array([np.nan]), np.array([1.0]))
+        starts.sort()
+        nearest = starts[: max(8, len(starts) // 10)]
+        weights = np.array([weight for _, weight, _ in nearest])
+        return Distribution(np.array([value for *_, value in nearest]), weights / weights.sum())
+
+    @property
+    def effective_problems(self) -> float:
+        """How many equally weighted problems the condition leaves (Kish)."""
+        by_problem: dict[str, float] = {}
+        for weight, run in zip(self.weights, self.recordings, strict=True):
+            by_problem[run.problem] = by_problem.get(run.problem, 0.0) + weight
+        return 1.0 / sum(weight**2 for weight in by_problem.values())
+
+    def band(
+        self, seconds: ArrayLike, confidence: float = 0.95, resamples: int = 400
+    ) -> tuple[Floats, Floats]:
+        """A band around the mean, simultaneous over the times: (low [times], high [times]).
+
+        Cluster bootstrap over problems, studentised by the largest deviation (sup-t).
+        """
+        times = np.atleast_1d(np.asarray(seconds, dtype=float))
+        table = self.weights[:, None] * np.nan_to_num(self.quality_at(times))
+        index = {problem: row for row, problem in enumerate(self.problems)}
+        rows = np.array([index[run.problem] for run in self.recordings])
+        per_problem = np.zeros((len(index), len(times)))
+        weight = np.zeros(len(index))
+        np.add.at(per_problem, rows, table)
+        np.add.at(weight, rows, self.weights)
+        mean = per_problem.sum(axis=0)
+        draws = np.random.default_rng(0).multinomial(
+            len(index), np.full(len(index), 1 / len(index)), size=resamples
+        )
+        total = np.maximum(draws @ weight, 1e-12)
+        sampled = (draws @ per_problem) / total[:, None]
+        spread = sampled.std(axis=0) + 1e-9
+        factor = float(np.quantile(np.max(np.abs(sampled - mean) / spread, axis=1), confidence))
+        return np.clip(mean - factor * spread, 0, 1), np.clip(mean + factor * spread, 0, 1)
+
+    def on(self, machine: Machine) -> Profile:
+        """This profile in the seconds of another machine: quality over work stays as it is."""
+        moved = tuple(
+            replace(
+                run,
+                seconds=machine.elapsed(self.module, run.work),
+                end=(float(machine.elapsed(self.module, np.array([run.end[1]]))[0]), run.end[1]),
+            )
+            for run in self.recordings
+        )
+        return replace(self, recordings=moved, machine=machine.name)
+
+    # Pictures
+
+    def _horizon(self) -> float:
+        return max(max((run.end[0] for run in self.recordings), default=0.0), 1e-9)
+
+    def __repr__(self) -> str:
+        times = np.linspace(0, self._horizon(), 24)
+        means = self.mean(times)
+        first = self.time_to(1e-9)
+        parts = [f"{self.module}  {sparkline(means)}  q {number(float(means[-1]))} "
+                 f"in {duration(self._horizon())}, first {duration(first)}"]
+        if self.condition:
+            parts.append("given " + ", ".join(f"{k}={v:.2g}" for k, v in self.condition.items()))
+        elif self.inputs:
+            parts.append("given " + ", ".join(self.inputs))
+        parts.append(f"{len(self.problems)} problems, {len(self.recordings)} runs")
+        if self.condition:
+            parts[-1] += f" (n_eff {self.effective_problems:.0f})"
+        parts.append(self.machine)
+        return " | ".join(parts)[:100]
+
+    def _repr_html_(self) -> str:
+        times = np.linspace(0, self._horizon(), 80)
+        levels: list[Profile] = [self]
+        labels = ["mean"]
+        if len(self.inputs) == 1 and not self.condition:
+            name = self.inputs[0]
+            seen = [run.inputs[name] for run in self.recordings if name in run.inputs]
+            values = sorted({round(float(v), 2) for v in np.quantile(seen, [0.1, 0.5, 0.9])})
+            levels = [self.given(**{name: value}) for value in values]
+            labels = [f"{name} = {value:g}" for value in values]
+        series = {
+            label: (times.tolist(), profile.mean(times).tolist())
+            for label, profile in zip(labels, levels, strict=True)
+        }
+        low, high = levels[-1].band(times)
+        bands = {labels[-1]: (times.tolist(), low.tolist(), high.tolist())}
+        svg = line_chart(
+            series, bands=bands, x_label="time [s]", y_label="expected quality", title=self.module
+        )
+        return figure(svg, repr(self))
+
+
+def _between(points: Floats, target: float) -> Floats:
+    """Linear interpolation weights of `target` among points [n], equal points sharing theirs."""
+    low = points[points <= target + 1e-12]
+    high = points[points >= target - 1e-12]
+    below = low.max() if len(low) else points.min()
+    above = high.min() if len(high) else points.max()
+    share = 0.0 if above - below < 1e-12 else (target - below) / (above - below)
+    weights = np.zeros(len(points))
+    for level, part in ((below, 1 - share), (above, share)):
+        chosen = np.abs(points - level) < 1e-12
+        weights[chosen] += part / chosen.sum()
+    return weights

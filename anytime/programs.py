@@ -1,0 +1,162 @@
+"""Programs as data: which module is called on what. Reading them from Python is the compiler's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from anytime.errors import AnytimeError
+
+if TYPE_CHECKING:
+    from anytime.modules import Module
+
+
+
+
+class Reading:
+    """A program being read: calls of modules are collected here in the order of their making."""
+
+    def __init__(self, program: str) -> None:
+        self.program = program
+        self.calls: list[Call] = []
+
+    def call(self, module: Module, arguments: tuple[object, ...]) -> Call:
+        """A new call; plain arguments become constants, the label is numbered when it repeats."""
+        same = sum(call.module is module for call in self.calls)
+        label = module.name if not same else f"{module.name}_{same + 1}"
+        nodes = tuple(a if isinstance(a, _Symbol) else Constant(a) for a in arguments)
+        made = Call(module, nodes, label)  # pyright: ignore[reportArgumentType]
+        self.calls.append(made)
+        return made
+
+
+# Set while the function of a program is called with symbolic inputs.
+_reading: ContextVar[Reading | None] = ContextVar("reading", default=None)
+
+
+@contextmanager
+def reading(program: str) -> Iterator[Reading]:
+    """While this is open, calling a module makes a `Call` instead of running it."""
+    opened = Reading(program)
+    token = _reading.set(opened)
+    try:
+        yield opened
+    finally:
+        _reading.reset(token)
+
+
+def being_read() -> Reading | None:
+    """The program that is being read, or None."""
+    return _reading.get()
+
+
+class _Symbol:
+    """A value that is not known while a program is read; using it as one is refused."""
+
+    def _refuse(self, what: str, cure: str) -> NoReturn:
+        opened = being_read()
+        where = f"program {opened.program!r}" if opened else "a program"
+        raise AnytimeError(
+            f"{where} {what} {self!r}, whose value is not known when it is compiled; {cure}"
+        )
+
+    def __getitem__(self, key: object) -> NoReturn:
+        self._refuse(f"takes item {key!r} of", "do it inside a module")
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        self._refuse(f"takes attribute .{name} of", "make it an input of its own or do it inside a module")
+
+    def __bool__(self) -> NoReturn:
+        self._refuse("branches on (or negates)", "use compiler.branch(test, then, otherwise)")
+
+    def __iter__(self) -> NoReturn:
+        self._refuse("iterates over", "use compiler.loop or do it inside a module")
+
+    def __call__(self, *_: object, **__: object) -> NoReturn:
+        self._refuse("calls", "only modules can be called in a program")
+
+    def __add__(self, other: object) -> NoReturn:
+        self._refuse("computes with", "do it inside a module")
+
+    __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __add__
+    __lt__ = __gt__ = __le__ = __ge__ = __neg__ = __add__  # pyright: ignore
+
+
+@dataclass(frozen=True, eq=False)
+class Input(_Symbol):
+    """An input of the program, known only when it runs."""
+
+    name: str
+
+    def __repr__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True, eq=False)
+class Constant(_Symbol):
+    """A value written in the program."""
+
+    value: Any
+
+    def __repr__(self) -> str:
+        return repr(self.value)
+
+
+@dataclass(frozen=True, eq=False)
+class Call(_Symbol):
+    """One call of a module. Compared by identity: a result used twice is one node, two equal
+    calls are two. `label` is the module's name, numbered when the program calls it again."""
+
+    module: Module
+    arguments: tuple[Input | Constant | Call, ...]
+    label: str
+
+    def __repr__(self) -> str:
+        return f"{self.label}({', '.join(map(repr, self.arguments))})"
+
+
+@dataclass(frozen=True)
+class Program:
+    """A composition of anytime modules.
+
+    inputs: names, in order; calls: every call, each after those it uses; output: the last.
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    calls: tuple[Call, ...]
+    output: Call
+
+    def __repr__(self) -> str:
+        return f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"
+
+    def call(self, label: str) -> Call:
+        """The call with this label. Raises AnytimeError naming the labels there are."""
+        for call in self.calls:
+            if call.label == label:
+                return call
+        raise AnytimeError(
+            f"program {self.name!r} has no call {label!r}; "
+            f"it has {', '.join(call.label for call in self.calls)}"
+        )
+
+
+def upstream(call: Call) -> dict[str, Call]:
+    """The calls that feed `call`, by the parameter of its module that they arrive at."""
+    return {
+        name: argument
+        for name, argument in zip(call.module.parameters, call.arguments, strict=True)
+        if isinstance(argument, Call)
+    }
+
+
+def program_of(module: Module) -> Program:
+    """A lone module as the program that calls it on inputs of its parameters' names."""
+    arguments = tuple(Input(name) for name in module.parameters)
+    call = Call(module, arguments, module.name)
+    return Program(module.name, module.parameters, (call,), call)

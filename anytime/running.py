@@ -1,0 +1,377 @@
+"""Running a module until it completes or its deadline comes."""
+
+from __future__ import annotations
+
+import hashlib
+import traceback
+from collections.abc import Callable, Mapping
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from anytime.clocks import Clock, Deadline, WallClock
+from anytime.errors import AnytimeError, OutsideRunError
+from anytime.modules import Module
+from anytime.pictures import duration, number
+
+
+class Status(Enum):
+    """What a run has to show: nothing, something, or all that it can give."""
+
+    NO_RESULT = "no result"
+    INTERRUPTED = "interrupted"
+    COMPLETE = "complete"
+
+
+class Change(NamedTuple):
+    """A registered result: when, after how much work, and what may be seen of its quality."""
+
+    seconds: float
+    work: float
+    estimate: float | None
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What a module raised."""
+
+    kind: str
+    message: str
+    details: str = field(repr=False, default="")
+
+    @classmethod
+    def of(cls, error: BaseException) -> Fault:
+        return cls(type(error).__name__, str(error), "".join(traceback.format_exception(error)))
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.message}" if self.message else self.kind
+
+
+@dataclass(frozen=True)
+class Result:
+    """The outcome of a run; truthy when there is something to use.
+
+    elapsed, overrun: seconds used, and seconds past the deadline (0 when in time).
+    history: every registration, in seconds and units of work since the start.
+    parts: of a composed program, the result of each call by its label.
+    """
+
+    status: Status
+    value: Any
+    fault: Fault | None
+    elapsed: float
+    overrun: float
+    history: tuple[Change, ...]
+    work: float = 0.0
+    parts: Mapping[str, Result] = field(default_factory=dict)
+    why: str = ""
+
+    def __bool__(self) -> bool:
+        return self.status is not Status.NO_RESULT
+
+    def __repr__(self) -> str:
+        over = f" ({duration(self.overrun)} over)" if self.overrun > 0 else ""
+        estimate = self.history[-1].estimate if self.history else None
+        seen = "" if estimate is None else f" {number(estimate)}"
+        count = f"{len(self.history)} result{'s' if len(self.history) != 1 else ''}"
+        lines = [f"{self.status.name}{seen} after {duration(self.elapsed)}{over} · {count}"]
+        lines += [f"  {label}: {part!r}".split("\n")[0] for label, part in self.parts.items()]
+        if self.fault:
+            lines.append(f"  fault: {self.fault}")
+        if self.why:
+            lines.append(f"  {self.why}")
+        return "\n".join(line[:100] for line in lines)
+
+
+class _Stop(BaseException):
+    """Raised by `register` at the deadline; only the run that it carries catches it."""
+
+    def __init__(self, run: Run) -> None:
+        super().__init__(run.module.name)
+        self.run = run
+
+
+class Run:
+    """One run in progress. `anytime.here()` hands it to a thread; it is closed when it ends."""
+
+    def __init__(
+        self,
+        module: Module,
+        deadline: Deadline,
+        observe: Callable[[Any, Change], None] | None = None,
+    ) -> None:
+        self.module = module
+        self.deadline = deadline
+        self.started = deadline.clock.now()
+        self.value: Any = None
+        self.history: list[Change] = []
+        self.work = 0.0
+        self.step_seconds: list[float] = []
+        self.charges = False
+        self.mixed = False
+        self.cut = False
+        self._observe = observe
+        self._steps = 0
+        self._last_step = self.started
+        self._closed = False
+
+    def charge(self, work: float) -> None:
+        """Count `work` units; from then on checks are free."""
+        self._open()
+        if not work >= 0:
+            raise AnytimeError(f"module {self.module.name!r} charged {work}; give a number >= 0")
+        self.mixed = self.mixed or (self._steps > 0 and not self.charges)
+        self.charges = True
+        self.work += work
+        self.deadline.clock.spend(self.module.name, work, None)
+
+    def check(self) -> None:
+        """A check-point: one unit of work, unless the module counts its own."""
+        self._open()
+        if not self.charges:
+            self.work += 1
+            self.deadline.clock.spend(self.module.name, 1.0, self._steps)
+        now = self.deadline.clock.now()
+        self.step_seconds.append(now - self._last_step)
+        self._last_step = now
+        self._steps += 1
+
+    def record(self, value: Any) -> None:
+        """Keep a result; it replaces the last."""
+        estimate = self.module.estimate
+        seen = None if estimate is None else float(estimate(value))
+        change = Change(self.deadline.clock.now() - self.started, self.work, seen)
+        self.value = value
+        self.history.append(change)
+        if self._observe is not None:
+            self._observe(value, change)
+
+    def register(self, value: Any, *ignored: object) -> None:
+        """Register a result; at the deadline this does not return."""
+        self.check()
+        self.record(value)
+        if self.deadline.expired():
+            self.cut = True
+            raise _Stop(self)
+
+    def expired(self) -> bool:
+        """Whether to stop now. Counts as a check-point."""
+        self.check()
+        self.cut = self.cut or self.deadline.expired()
+        return self.cut
+
+    def may_step(self) -> bool:
+        """Whether the next step is expected to end in time, from a clipped moving average of the
+        steps so far. The first result is never refused before the deadline."""
+        left = self.deadline.remaining()
+        if left <= 0:
+            return False
+        if not self.history or not self.step_seconds:
+            return True
+        average = self.step_seconds[0]
+        for seconds in self.step_seconds[-8:]:
+            average += 0.4 * (min(seconds, 4 * average + 1e-6) - average)
+        return average <= left
+
+    def close(self) -> None:
+        self._closed = True
+
+    def _open(self) -> None:
+        if self._closed:
+            raise OutsideRunError(
+                f"the run of {self.module.name!r} has ended; what comes later is not registered"
+            )
+
+
+_current: ContextVar[Run | None] = ContextVar("run", default=None)
+
+
+def here() -> Run:
+    """The current run, to be handed to a thread: its `register`, `expired` and `charge` need no
+    context. Raises OutsideRunError outside a run."""
+    return _here("here")
+
+
+def register(value: Any, *ignored: object) -> None:
+    """Register a result of the module that runs here; further arguments, which some solvers pass
+    to their callbacks, are ignored.
+
+    At the deadline the value is kept and the run ends here. Raises OutsideRunError outside a run.
+    """
+    _here("register").register(value)
+
+
+def expired() -> bool:
+    """Whether the module that runs here should stop. Raises OutsideRunError outside a run."""
+    return _here("expired").expired()
+
+
+def charge(work: float) -> None:
+    """Count `work` units of the module's own currency (expansions, evaluations, exposures).
+
+    Charge before the check-point (`yield`, `register`, `expired`) that the work led to. Raises
+    OutsideRunError outside a run.
+    """
+    _here("charge").charge(work)
+
+
+def _here(called: str) -> Run:
+    run = _current.get()
+    if run is None:
+        raise OutsideRunError(
+            f"anytime.{called}() outside a run; use anytime.run(module, …, seconds=…), "
+            "and in a thread the object of anytime.here()"
+        )
+    return run
+
+
+def run(
+    module: Module,
+    *inputs: Any,
+    seconds: float | None = None,
+    deadline: Deadline | None = None,
+    rng: np.random.Generator | None = None,
+    memory: dict[str, Any] | None = None,
+) -> Result:
+    """Run a module until it completes or its time is up, and return the last result.
+
+    seconds: the time it may take; zero or negative means stop now. deadline: the same, absolute;
+    give one of them. Inside another run it ends at the earlier deadline. rng, memory: what the
+    module's parameters of these names get; fresh ones otherwise, the generator seeded by the
+    module's name. What the module raises becomes `Result.fault`.
+    Raises AnytimeError for inputs that do not fit the module.
+    """
+    if (seconds is None) == (deadline is None):
+        raise AnytimeError(f"give seconds=… or deadline=… to run {module.name!r}, one of them")
+    outer = _current.get()
+    if deadline is None:
+        clock: Clock = outer.deadline.clock if outer else WallClock()
+        deadline = Deadline.after(seconds or 0.0, clock)
+    if outer is not None and outer.deadline.clock is deadline.clock:
+        deadline = Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
+    return execute(module, inputs, deadline, rng=rng, memory=memory)[0]
+
+
+def call_inside(module: Module, inputs: tuple[object, ...]) -> Any:
+    """A module called like a function inside another's run: run with what is left."""
+    outer = _current.get()
+    if outer is None:
+        raise AnytimeError(
+            f"{module.name} is a module: use anytime.run({module.name}, …, seconds=…), "
+            "or call it in a function decorated with @compiler.program"
+        )
+    result, _ = execute(module, inputs, outer.deadline)
+    return result.value
+
+
+def seed_of(*what: object) -> int:
+    """A seed that depends on what is run, never on the order or the process."""
+    return int.from_bytes(hashlib.blake2b(repr(what).encode(), digest_size=8).digest(), "big")
+
+
+def execute(
+    module: Module,
+    inputs: tuple[Any, ...],
+    deadline: Deadline,
+    *,
+    rng: np.random.Generator | None = None,
+    memory: dict[str, Any] | None = None,
+    may_step: Callable[[Run], bool] | None = None,
+    observe: Callable[[Any, Change], None] | None = None,
+) -> tuple[Result, Run]:
+    """`run` for those who measure and schedule: also returns the closed `Run`.
+
+    may_step: decides before each step of a generator whether it is still worth starting.
+    observe: called off the record with each registered value.
+    """
+    if len(inputs) != len(module.parameters):
+        raise AnytimeError(
+            f"module {module.name!r} takes {len(module.parameters)} inputs "
+            f"({', '.join(module.parameters)}), not {len(inputs)}"
+        )
+    filled: dict[str, Any] = {}
+    if "seconds" in module.filled:
+        filled["seconds"] = max(0.0, deadline.remaining())
+    if "rng" in module.filled:
+        filled["rng"] = rng if rng is not None else np.random.default_rng(seed_of(module.name))
+    if "memory" in module.filled:
+        filled["memory"] = memory if memory is not None else {}
+    current = Run(module, deadline, observe)
+    complete, fault = False, None
+    if not deadline.expired():
+        try:
+            if module.generator:
+                complete = _generate(current, inputs, filled, may_step or Run.may_step)
+            else:
+                complete = _call(current, inputs, filled)
+        except _Stop as stop:
+            if stop.run is not current:
+                raise
+        except (Exception, SystemExit) as error:
+            fault = Fault.of(error)
+        finally:
+            current.close()
+    return _result(current, complete and not current.cut, fault), current
+
+
+def _generate(
+    current: Run,
+    inputs: tuple[Any, ...],
+    filled: dict[str, Any],
+    may_step: Callable[[Run], bool],
+) -> bool:
+    steps = current.module.function(*inputs, **filled)
+    try:
+        while may_step(current):
+            # Around each step alone: a context variable set in a generator leaks to its caller.
+            token = _current.set(current)
+            try:
+                value = next(steps)
+            except StopIteration as end:
+                if end.value is not None:
+                    current.check()
+                    current.record(end.value)
+                return True
+            finally:
+                _current.reset(token)
+            current.check()
+            if value is not None:
+                current.record(value)
+        return False
+    finally:
+        steps.close()
+
+
+def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool:
+    token = _current.set(current)
+    try:
+        value = current.module.function(*inputs, **filled)
+    finally:
+        _current.reset(token)
+    if value is not None:
+        current.check()
+        current.record(value)
+    return True
+
+
+def _result(current: Run, complete: bool, fault: Fault | None) -> Result:
+    now = current.deadline.clock.now()
+    overrun = max(0.0, now - max(current.deadline.at, current.started))
+    if not current.history:
+        status = Status.NO_RESULT
+    elif complete and fault is None:
+        status = Status.COMPLETE
+    else:
+        status = Status.INTERRUPTED
+    return Result(
+        status,
+        current.value,
+        fault,
+        now - current.started,
+        overrun,
+        tuple(current.history),
+        current.work,
+    )
