@@ -1,5 +1,7 @@
-"""What a robot senses: maps and their quad-tree, map files, random floors."""
+"""What a robot senses: maps, their files and quad-tree, random floors, anytime vision, belief."""
 
+from sensing.belief import Belief, weight_of
+from sensing.camera import Camera
 from sensing.maps import GridMap, map_folder, nearest_free, read_map, trace_folder
 from sensing.movingai import (
     OPTIMUM_TOLERANCE,
@@ -9,6 +11,7 @@ from sensing.movingai import (
     write_movingai,
     write_scenarios,
 )
+from sensing.quadtree import QuadTree, quad_tree
 from sensing.random_maps import (
     FAMILIES,
     clustered,
@@ -20,26 +23,45 @@ from sensing.random_maps import (
     uniform,
 )
 from sensing.ros_maps import read_ros_map, write_ros_map
+from sensing.sensed_maps import Disc, MapScore, SensedMap, disc, score
+from sensing.vision import Device, Look, Sensor, Vision, looks, see, sense
 
 __all__ = [
     "FAMILIES",
     "OPTIMUM_TOLERANCE",
+    "Belief",
+    "Camera",
+    "Device",
+    "Disc",
     "GridMap",
+    "Look",
+    "MapScore",
+    "QuadTree",
     "Scenario",
+    "SensedMap",
+    "Sensor",
+    "Vision",
     "clustered",
     "connected",
     "corner_to_corner",
+    "disc",
     "instance",
+    "looks",
     "map_folder",
     "maze",
     "nearest_free",
+    "quad_tree",
     "read_map",
     "read_movingai",
     "read_ros_map",
     "read_scenarios",
     "rooms",
+    "score",
+    "see",
+    "sense",
     "trace_folder",
     "uniform",
+    "weight_of",
     "write_movingai",
     "write_ros_map",
     "write_scenarios",
