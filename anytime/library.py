@@ -71,7 +71,9 @@ class ProfileLibrary(Mapping[str, Profile]):
 
     def _read(self, root: Path) -> None:
         if not root.is_dir():
-            raise AnytimeError(f"{root}: no such folder; anytime profile … --library {root} makes it")
+            raise AnytimeError(
+                f"{root}: no such folder; anytime profile … --library {root} makes it"
+            )
         for path in sorted(root.glob("*.profile")):
             profile = _restore(path)
             self._profiles[profile.module] = profile
@@ -175,7 +177,9 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     if run.estimates is not None and len(run.estimates) != count:
         raise refuse("estimates and seconds differ in length")
     for name, column in (("seconds", run.seconds), ("work", run.work)):
-        if any(b < a for a, b in zip(column, column[1:], strict=False)) or (column and column[0] < 0):
+        if any(b < a for a, b in zip(column, column[1:], strict=False)) or (
+            column and column[0] < 0
+        ):
             raise refuse(f"{name} must not decrease or be negative")
     if min(run.end) < 0:
         raise refuse("the end of a run cannot be negative")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from anytime.clocks import Clock, Deadline, WallClock
+from anytime.clocks import Clock, Deadline, WallClock, WorkClock
 from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine, Rate, charged_rate, stepped_rate
@@ -75,7 +76,9 @@ def measure(
             ]
         if progress is not None:
             progress(done + 1, len(listed))
-    return _library(program, keys, samples)
+    made = clock()
+    known = made.machine if isinstance(made, WorkClock) else None
+    return _library(program, keys, samples, known)
 
 
 def _sample(
@@ -94,10 +97,7 @@ def _sample(
         by_name[name] if isinstance(argument, Call) else _argument(argument, problem)
         for name, argument in zip(module.parameters, call.arguments, strict=True)
     )
-    if rest:
-        import time
-
-        time.sleep(rest)
+    time.sleep(rest)
     kept: list[Any] = []
     changes: list[Change] = []
 
@@ -187,7 +187,10 @@ def _strata(
 
 
 def _library(
-    program: Program, keys: Sequence[str], samples: Mapping[str, Mapping[str, list[_Sample]]]
+    program: Program,
+    keys: Sequence[str],
+    samples: Mapping[str, Mapping[str, list[_Sample]]],
+    machine: Machine | None,
 ) -> ProfileLibrary:
     references: dict[str, dict[str, float]] = {}
     for call in program.calls:
@@ -221,9 +224,11 @@ def _library(
             profiles[name] = replace(known, recordings=(*known.recordings, *recordings))
         elif recordings:
             best = {k: v for k, v in references.get(name, {}).items()}
-            profiles[name] = Profile(name, tuple(feeding), tuple(recordings), best)
+            profiles[name] = Profile(
+                name, tuple(feeding), tuple(recordings), best, machine.name if machine else "this"
+            )
         rates[name] = _rate([run for runs in samples[call.label].values() for run in runs])
-    return ProfileLibrary(profiles=profiles, machine=Machine("this", rates))
+    return ProfileLibrary(profiles=profiles, machine=machine or Machine("this", rates))
 
 
 def _recording(call: Call, key: str, sample: _Sample, inputs: Mapping[str, float]) -> Recording:
@@ -284,5 +289,7 @@ def _digest(program: Program, problem: Any) -> str:
             plain = array.dtype != object
         except (ValueError, TypeError):
             plain = False
-        digest.update(np.ascontiguousarray(array).tobytes() if plain else type(value).__name__.encode())
+        digest.update(
+            np.ascontiguousarray(array).tobytes() if plain else type(value).__name__.encode()
+        )
     return digest.hexdigest()

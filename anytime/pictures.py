@@ -102,7 +102,9 @@ def line_chart(
             f'<text x="{right - 98}" y="{legend}">{html.escape(label)}</text>'
         )
     middle = (left + right) / 2
-    parts.append(f'<text x="{middle}" y="{height - 6}" text-anchor="middle">{html.escape(x_label)}</text>')
+    parts.append(
+        f'<text x="{middle}" y="{height - 6}" text-anchor="middle">{html.escape(x_label)}</text>'
+    )
     parts.append(
         f'<text transform="translate(12 {(top + bottom) / 2}) rotate(-90)" '
         f'text-anchor="middle">{html.escape(y_label)}</text>'

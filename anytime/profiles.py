@@ -287,8 +287,10 @@ class Profile:
         times = np.linspace(0, self._horizon(), 24)
         means = self.mean(times)
         first = self.time_to(1e-9)
-        parts = [f"{self.module}  {sparkline(means)}  q {number(float(means[-1]))} "
-                 f"in {duration(self._horizon())}, first {duration(first)}"]
+        parts = [
+            f"{self.module}  {sparkline(means)}  q {number(float(means[-1]))} "
+            f"in {duration(self._horizon())}, first {duration(first)}"
+        ]
         if self.condition:
             parts.append("given " + ", ".join(f"{k}={v:.2g}" for k, v in self.condition.items()))
         elif self.inputs:

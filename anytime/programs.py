@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from anytime.modules import Module
 
 
-
-
 class Reading:
     """A program being read: calls of modules are collected here in the order of their making."""
 
@@ -69,7 +67,9 @@ class _Symbol:
     def __getattr__(self, name: str) -> NoReturn:
         if name.startswith("__"):
             raise AttributeError(name)
-        self._refuse(f"takes attribute .{name} of", "make it an input of its own or do it inside a module")
+        self._refuse(
+            f"takes attribute .{name} of", "make it an input of its own or do it inside a module"
+        )
 
     def __bool__(self) -> NoReturn:
         self._refuse("branches on (or negates)", "use compiler.branch(test, then, otherwise)")

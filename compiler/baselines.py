@@ -1,0 +1,67 @@
+"""The divisions that a compiled one must beat. [ZR93] Fig. 8."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compiler.division import expected_quality, moments_within
+from compiler.tables import Floats, Table
+
+
+def minimal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
+    """MIN: every call but the last just until it has a result, the last the rest."""
+    return _rest_to_last([table.first for table in tables[:-1]], seconds)
+
+
+def maximal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
+    """MAX: every call but the last until it no longer improves, the last the rest."""
+    return _rest_to_last([_saturation(table) for table in tables[:-1]], seconds)
+
+
+def even_shares(tables: Sequence[Table], seconds: float) -> list[float]:
+    """The same time for every call."""
+    return [seconds / len(tables)] * len(tables)
+
+
+def minimal(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
+    """Expected quality of MIN for each budget, [T]."""
+    return _promised(tables, seconds, minimal_shares)
+
+
+def maximal(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
+    """Expected quality of MAX for each budget, [T]."""
+    return _promised(tables, seconds, maximal_shares)
+
+
+def equal_shares(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
+    """Expected quality of equal shares for each budget, [T]."""
+    return _promised(tables, seconds, even_shares)
+
+
+def _promised(
+    tables: Sequence[Table],
+    seconds: ArrayLike,
+    shares_of: Callable[[Sequence[Table], float], list[float]],
+) -> Floats:
+    budgets = np.atleast_1d(np.asarray(seconds, dtype=float))
+    promised = np.zeros(len(budgets))
+    for index, budget in enumerate(budgets):
+        shares = shares_of(tables, float(budget))
+        if min(shares) < 0:
+            continue  # the budget does not reach the last call
+        promised[index] = expected_quality(tables, moments_within(tables, shares))
+    return promised
+
+
+def _rest_to_last(shares: list[float], seconds: float) -> list[float]:
+    return [*shares, seconds - sum(shares)]
+
+
+def _saturation(table: Table) -> float:
+    """Seconds after which the call's expected quality has reached its greatest value."""
+    expected = table.expected[(slice(1, None),) * len(table.feeds)]
+    mean = expected.reshape(-1, len(table.times)).mean(axis=0)
+    return float(table.times[int(np.flatnonzero(mean >= mean.max() - 1e-9)[0])])

@@ -1,0 +1,62 @@
+"""The deadline guard: whether a module's next step is still worth starting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from anytime.profiles import Profile
+from anytime.running import Run
+
+STEPS = 32  # steps whose durations are kept one by one; the last stands for all later ones
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How long each step of a module takes: median and 95th percentile by index, in seconds."""
+
+    median: tuple[float, ...]
+    p95: tuple[float, ...]
+
+
+def steps_of(profile: Profile) -> Steps:
+    """The durations between registrations that a profile recorded."""
+    gaps: list[list[float]] = [[] for _ in range(STEPS)]
+    for run in profile.recordings:
+        for index, gap in enumerate(np.diff(run.seconds, prepend=0.0)):
+            gaps[min(index, STEPS - 1)].append(float(gap))
+    known = [gap for gap in gaps if gap]
+    return Steps(
+        tuple(float(np.median(gap)) for gap in known),
+        tuple(float(np.quantile(gap, 0.95)) for gap in known),
+    )
+
+
+def guard(steps: Steps | None, share_ends: float, hard_end: float) -> Callable[[Run], bool] | None:
+    """What decides before each step of a generator that is not the last call.
+
+    Shares are soft and the program's deadline alone is hard: the median of the next step is held
+    against the share, its p95 against `hard_end`, the deadline less the least time of the rest.
+    Within that the first result is never refused.
+    """
+    if steps is None or not steps.median:
+        return None
+    known = steps
+
+    def may_step(run: Run) -> bool:
+        now = run.deadline.clock.now()
+        index = min(len(run.history), len(known.median) - 1)
+        if now + known.p95[index] > hard_end and run.history:
+            return False
+        if not run.history:
+            return now < hard_end
+        return now + known.median[index] <= share_ends + 1e-12
+
+    return may_step
+
+
+def guards_of(profiles: Mapping[str, Profile]) -> dict[str, Steps]:
+    """The step durations of every module in a library."""
+    return {name: steps_of(profile) for name, profile in profiles.items()}

@@ -1,0 +1,206 @@
+"""Compiled programs as files. A file names its modules and never imports them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from anytime.errors import AnytimeError
+from anytime.files import Stored, read_record, write_record
+from anytime.modules import Module
+from anytime.programs import Call, Constant, Input, Program
+from compiler.division import Frontier
+from compiler.guarding import Steps
+from compiler.tables import Table
+
+if TYPE_CHECKING:
+    from compiler.compiled import CompiledProgram
+
+SCHEMA = "anytime.schedule/1"
+
+
+class _Argument(Stored):
+    input: str | None = None
+    call: str | None = None
+    constant: float | int | str | bool | None = None
+
+
+class _Call(Stored):
+    label: str
+    module: str
+    parameters: list[str]
+    arguments: list[_Argument]
+
+
+class _Table(Stored):
+    label: str
+    module: str
+    feeds: list[str]
+    levels: list[float]
+    times: list[float]
+    shape: list[int]
+    chances: list[float]
+    first: float
+
+
+class _Schedule(Stored):
+    name: str
+    inputs: list[str]
+    machine: str
+    calls: list[_Call]
+    tables: list[_Table]
+    budgets: list[float]
+    shares: list[list[float]]
+    promised: list[float]
+    intervals: list[tuple[float, float, float]]
+    steps: dict[str, list[list[float]]]
+
+
+def save(compiled: CompiledProgram, path: Path) -> None:
+    """Write a compiled program, atomically. Raises AnytimeError for constants that no file holds."""
+    frontier = compiled.frontier
+    record = _Schedule(
+        name=compiled.name,
+        inputs=list(compiled.program.inputs),
+        machine=compiled.machine,
+        calls=[_store_call(call) for call in compiled.program.calls],
+        tables=[_store_table(table) for table in compiled.tables],
+        budgets=frontier.budgets.tolist(),
+        shares=frontier.shares.tolist(),
+        promised=frontier.promised.tolist(),
+        intervals=[(i.seconds, i.low, i.high) for i in compiled.intervals],
+        steps={name: [list(s.median), list(s.p95)] for name, s in compiled.steps.items()},
+    )
+    write_record(path, SCHEMA, record)
+
+
+def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
+    """Read a compiled program and bind its calls to these modules by name.
+
+    Raises AnytimeError for a broken file, for a module that is missing or has other parameters.
+    """
+    from compiler.compiled import CompiledProgram, Interval
+
+    file = Path(path)
+    stored = read_record(file, SCHEMA, _Schedule)
+    program = _bind(file, stored, {module.name: module for module in modules})
+    made = tuple(_restore_table(file, table) for table in stored.tables)
+    _check(file, stored, made)
+    return CompiledProgram(
+        program=program,
+        tables=made,
+        frontier=Frontier(
+            np.array(stored.budgets),
+            np.array(stored.shares).reshape(len(stored.budgets), len(made)),
+            np.array(stored.promised),
+        ),
+        intervals=tuple(Interval(*row) for row in stored.intervals),
+        steps={
+            name: Steps(tuple(rows[0]), tuple(rows[1]))
+            for name, rows in stored.steps.items()
+            if len(rows) == 2
+        },
+        machine=stored.machine,
+    )
+
+
+def _store_call(call: Call) -> _Call:
+    arguments: list[_Argument] = []
+    for argument in call.arguments:
+        if isinstance(argument, Input):
+            arguments.append(_Argument(input=argument.name))
+        elif isinstance(argument, Call):
+            arguments.append(_Argument(call=argument.label))
+        elif isinstance(argument.value, float | int | str | bool | None):
+            arguments.append(_Argument(constant=argument.value))
+        else:
+            raise AnytimeError(
+                f"{call!r} has a constant of type {type(argument.value).__name__}, which a file "
+                "cannot hold; make it an input of the program"
+            )
+    return _Call(
+        label=call.label,
+        module=call.module.name,
+        parameters=list(call.module.parameters),
+        arguments=arguments,
+    )
+
+
+def _bind(path: Path, stored: _Schedule, modules: dict[str, Module]) -> Program:
+    calls: dict[str, Call] = {}
+    for record in stored.calls:
+        module = modules.get(record.module)
+        if module is None:
+            raise AnytimeError(
+                f"{path} calls the module {record.module!r}, which is not among modules=[…] "
+                f"({', '.join(modules) or 'none'})"
+            )
+        if list(module.parameters) != record.parameters:
+            raise AnytimeError(
+                f"{path} was compiled for {record.module}({', '.join(record.parameters)}); "
+                f"the module given takes ({', '.join(module.parameters)}). Compile it again"
+            )
+        arguments: list[Input | Constant | Call] = []
+        for argument in record.arguments:
+            if argument.input is not None:
+                arguments.append(Input(argument.input))
+            elif argument.call is None:
+                arguments.append(Constant(argument.constant))
+            elif argument.call in calls:
+                arguments.append(calls[argument.call])
+            else:
+                raise AnytimeError(f"{path}: {record.label} uses {argument.call!r} before its call")
+        calls[record.label] = Call(module, tuple(arguments), record.label)
+    if not calls:
+        raise AnytimeError(f"{path}: has no calls; a program has at least one")
+    return Program(
+        stored.name, tuple(stored.inputs), tuple(calls.values()), list(calls.values())[-1]
+    )
+
+
+def _store_table(table: Table) -> _Table:
+    return _Table(
+        label=table.label,
+        module=table.module,
+        feeds=list(table.feeds),
+        levels=table.levels.tolist(),
+        times=table.times.tolist(),
+        shape=list(table.chances.shape),
+        chances=[float(f"{chance:.9g}") for chance in table.chances.ravel()],
+        first=table.first,
+    )
+
+
+def _restore_table(path: Path, record: _Table) -> Table:
+    if int(np.prod(record.shape, dtype=float)) != len(record.chances):
+        raise AnytimeError(
+            f"{path}: table {record.label}: chances do not fill shape {record.shape}"
+        )
+    if record.shape[-2:] != [len(record.times), len(record.levels)]:
+        raise AnytimeError(f"{path}: table {record.label}: shape does not fit times and levels")
+    if any(not -1e-9 <= chance <= 1 + 1e-6 for chance in record.chances):
+        raise AnytimeError(f"{path}: table {record.label}: a chance lies outside [0, 1]")
+    return Table(
+        record.label,
+        record.module,
+        tuple(record.feeds),
+        np.array(record.levels),
+        np.array(record.times),
+        np.array(record.chances).reshape(record.shape),
+        record.first,
+    )
+
+
+def _check(path: Path, stored: _Schedule, tables: Sequence[Table]) -> None:
+    if [table.label for table in tables] != [call.label for call in stored.calls]:
+        raise AnytimeError(f"{path}: its tables are not those of its calls")
+    count = len(stored.budgets)
+    if not count or len(stored.shares) != count or len(stored.promised) != count:
+        raise AnytimeError(f"{path}: budgets, shares and promised differ in length or are empty")
+    if any(len(row) != len(tables) for row in stored.shares):
+        raise AnytimeError(f"{path}: a row of shares has not one share for each call")
+    if any(b <= a for a, b in zip(stored.budgets, stored.budgets[1:], strict=False)):
+        raise AnytimeError(f"{path}: budgets must increase")
