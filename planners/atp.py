@@ -1,0 +1,224 @@
+"""ATP, the interruptible abstract planner of [ZR93] Figure 3."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+import anytime
+from anytime.errors import AnytimeError
+from planners.multipath import MultiPath
+from planners.path_finding import Cell, index_of
+from planners.search import DIAGONAL, STRAIGHT, WALL, workspace
+from planners.windows import (
+    ABSTRACT,
+    COUNT,
+    FIRST,
+    FULL,
+    HEAD_SEGMENT,
+    LEVEL,
+    NEXT,
+    OBSTACLENESS,
+    Pyramid,
+    first_plan,
+    refine,
+)
+
+HIGHEST_LEVEL = 3
+"""The paper's Lmax."""
+
+# Fewer abstract positions than this between start and goal are no plan: begin a level lower.
+_FEWEST_POSITIONS = 4
+# Expansions between two yields, so that steps cost about the same and Python's share stays small.
+_GRAIN = 32
+# A streamed cell is worth 1/256 of an expansion, in all places where work is counted.
+_STREAMED_PER_EXPANSION = 256
+# How much longer than planned a robot walks that bumps its way through obstacleness p: fitted to
+# blind walks on uniform floors of 10 to 35 %, 1 + p/2 + 3.5 p².
+_LINEAR, _SQUARE = 0.5, 3.5
+# The dearest believed obstacle, and the dearest abstract cell.
+_DEAREST = 250
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What the planner did since its last step: the work, and the best plan if it is a new one."""
+
+    work: float
+    plan: MultiPath | None
+
+
+def steps(
+    domain: NDArray[np.float32],
+    start: Cell,
+    goal: Cell,
+    *,
+    highest_level: int | None = None,
+    grain: int = _GRAIN,
+) -> Iterator[Step]:
+    """Plan from start to goal, abstractly at first, then in ever more detail.
+
+    `domain` is float32 [rows, columns], the probability that a cell is blocked. A cell that is
+    blocked for certain (1.0) is impassable, a believed obstacle only dear. The first step brings a
+    plan at `highest_level` (chosen by distance, at most 3, if None), later ones refine its worst
+    segment, at least `grain` expansions a step. A step without a plan found none better. The last
+    one brings the plan that is refined as far as it can be. Work is counted in node expansions,
+    with 1/256 for every cell summed.
+
+    Raises AnytimeError if start or goal is outside the domain or certainly blocked. If no way leads
+    to the goal the abstract plan says nothing of it: the robot that follows it finds out.
+    """
+    domain = np.ascontiguousarray(domain, np.float32)
+    if domain.ndim != 2 or not domain.size:
+        raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [rows, columns]")
+    first, last = index_of(start, domain.shape, "start"), index_of(goal, domain.shape, "goal")
+    for index, name, cell in ((first, "start", start), (last, "goal", goal)):
+        if domain.reshape(-1)[index] >= 1.0:
+            raise AnytimeError(
+                f"{name} cell ({cell[0]}, {cell[1]}) is blocked for certain, choose a free cell"
+            )
+    level = _level(domain.shape, start, goal) if highest_level is None else highest_level
+    if not 0 <= level <= 15:
+        raise AnytimeError(f"highest_level is {level}, it must be between 0 and 15")
+    pyramid, streamed = _pyramid(domain, level)
+    if streamed < 0:
+        raise AnytimeError("the domain holds a number outside [0, 1], they must be probabilities")
+    work, straight = workspace(domain.size), _straight(start, goal)
+    state, expansions = first_plan(pyramid, level, first, last, work)
+    best = _multipath(state, pyramid, straight)
+    yield Step(expansions + streamed / _STREAMED_PER_EXPANSION, best)
+    done = False
+    while not done:
+        state, expansions, done = refine(state, pyramid, grain, work)
+        plan = _multipath(state, pyramid, straight)
+        # A base level plan's length is known, an abstract one's only believed.
+        better = plan.length < best.length or (done and plan.level < best.level)
+        best = plan if better else best
+        if expansions or better:
+            yield Step(float(expansions), plan if better else None)
+
+
+@anytime.module(estimate=lambda plan: plan.estimate, name="atp")
+def find_path(domain, start, goal):
+    """Plan a path from start to goal; `domain` is the probability of being blocked of each cell."""
+    for step in steps(domain, start, goal):
+        anytime.charge(step.work)
+        yield step.plan
+
+
+def _level(shape: tuple[int, ...], start: Cell, goal: Cell) -> int:
+    distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
+    level = HIGHEST_LEVEL
+    while level > 0 and distance >> level < _FEWEST_POSITIONS:
+        level -= 1
+    return level
+
+
+def _straight(start: Cell, goal: Cell) -> float:
+    near, far = sorted((abs(start[0] - goal[0]), abs(start[1] - goal[1])))
+    return far - near + near * math.sqrt(2)
+
+
+def _multipath(state, pyramid: Pyramid, straight: float) -> MultiPath:
+    plan, bounds, blocked, length = _flatten(state, pyramid)
+    return MultiPath(plan, bounds, blocked, max(length, straight), straight)
+
+
+@njit(cache=True, nogil=True)
+def _abstract_cost(blocked):
+    """Return the cost of an abstract cell: length and obstacleness together."""
+    p = blocked / FULL
+    return min(_DEAREST, int(ABSTRACT * (1.0 + _LINEAR * p + _SQUARE * p * p) + 0.5))
+
+
+@njit(cache=True, nogil=True)
+def _pyramid(domain, highest):
+    """Sum a domain up to its obstacleness on all levels: (pyramid, cells streamed, -1 if invalid).
+
+    Cells outside the map count as blocked.
+    """
+    rows, columns = domain.shape
+    offset, widths = np.zeros(highest + 2, np.int64), np.zeros(highest + 1, np.int64)
+    height, width = rows, columns
+    for level in range(highest + 1):
+        widths[level] = width
+        offset[level + 1] = offset[level] + height * width
+        height, width = (height + 1) // 2, (width + 1) // 2
+    obstacleness = np.empty(offset[highest + 1], np.int32)
+    cost = np.empty(offset[highest + 1], np.uint8)
+    pyramid = Pyramid(obstacleness, cost, offset, widths)
+    streamed = rows * columns
+    for row in range(rows):
+        for column in range(columns):
+            p = float(domain[row, column])
+            if not 0.0 <= p <= 1.0:
+                return pyramid, -1
+            there = row * columns + column
+            obstacleness[there] = int(p * FULL + 0.5)
+            if p == 0.0:
+                cost[there] = 1
+            elif p >= 1.0:
+                cost[there] = WALL
+            else:
+                cost[there] = int(min(float(_DEAREST), 1.0 + 4.0 * p / (1.0 - p)) + 0.5)
+    for level in range(1, highest + 1):
+        below, here = offset[level - 1], offset[level]
+        low_columns, high_columns = widths[level - 1], widths[level]
+        low_rows = (here - below) // low_columns
+        streamed += here - below
+        for row in range((low_rows + 1) // 2):
+            for column in range(high_columns):
+                total = 0
+                for child in range(4):
+                    r, c = 2 * row + (child >> 1), 2 * column + (child & 1)
+                    if r < low_rows and c < low_columns:
+                        total += obstacleness[below + r * low_columns + c]
+                    else:
+                        total += FULL
+                there = here + row * high_columns + column
+                obstacleness[there] = (total + 2) >> 2
+                cost[there] = _abstract_cost(obstacleness[there])
+    return pyramid, streamed
+
+
+@njit(cache=True, nogil=True)
+def _flatten(state, pyramid):
+    """List all cells of a plan in order: (plan, bounds, obstacleness, believed length)."""
+    segments, cells, number = 0, 0, int(state.size[HEAD_SEGMENT])
+    while number >= 0:
+        segments += 1
+        cells += int(state.segment[number, COUNT])
+        number = int(state.segment[number, NEXT])
+    plan = np.empty((cells, 3), np.int32)
+    bounds = np.zeros(segments + 1, np.int32)
+    obstacleness = np.empty(segments)
+    segments, cells, length = 0, 0, 0.0
+    number = int(state.size[HEAD_SEGMENT])
+    while number >= 0:
+        level, first = int(state.segment[number, LEVEL]), int(state.segment[number, FIRST])
+        columns, base = pyramid.columns[level], pyramid.offset[level]
+        before, before_row, before_column = 0.0, 0, 0
+        for place in range(int(state.segment[number, COUNT])):
+            there = int(state.cell[first + place])
+            row, column = there // columns, there % columns
+            plan[cells, 0] = level
+            plan[cells, 1] = row
+            plan[cells, 2] = column
+            cells += 1
+            p = pyramid.obstacleness[base + there] / FULL
+            through = 1.0 + _LINEAR * p + _SQUARE * p * p
+            if place > 0:
+                straight = row == before_row or column == before_column
+                step = (STRAIGHT if straight else DIAGONAL) << level
+                length += step * (before + through) / (2.0 * STRAIGHT)
+            before, before_row, before_column = through, row, column
+        obstacleness[segments] = state.segment[number, OBSTACLENESS] / FULL
+        segments += 1
+        bounds[segments] = cells
+        number = int(state.segment[number, NEXT])
+    return plan, bounds, obstacleness, length
