@@ -86,7 +86,7 @@ def draw() -> GridMap:
         thick = _thickness(free[top], column)
         doorways[top : top + _DOOR, thick[0] : thick[1]] = True
     free |= doorways
-    keep_clear = np.asarray(ndimage.binary_dilation(doorways, iterations=6))
+    keep_clear = ndimage.binary_dilation(doorways, iterations=6).astype(bool)
     keep_clear[START[0] - 4 : START[0] + 5, START[1] - 4 : START[1] + 5] = True
     keep_clear[GOAL[0] - 4 : GOAL[0] + 5, GOAL[1] - 4 : GOAL[1] + 5] = True
     furniture = np.zeros_like(free)
@@ -95,8 +95,8 @@ def draw() -> GridMap:
     free &= ~(furniture & ~keep_clear)
     begin = np.zeros_like(free)
     begin[START] = True
-    reachable = ndimage.binary_propagation(begin, mask=free)
-    return GridMap(np.asarray(reachable), resolution=RESOLUTION, name="office")
+    reachable = ndimage.binary_propagation(begin, mask=free).astype(bool)
+    return GridMap(reachable, resolution=RESOLUTION, name="office")
 
 
 def read_office() -> GridMap:

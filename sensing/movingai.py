@@ -82,7 +82,7 @@ def read_movingai(path: str | os.PathLike[str]) -> GridMap:
     if len(rows) != height:
         _refuse(
             path,
-            line + min(len(rows), height),
+            line + min(len(rows), height + 1),
             f"the map has {len(rows)} rows; the header says height {height}",
         )
     kinds = _GLYPHS[np.frombuffer(b"".join(rows), np.uint8)].reshape(height, width)
