@@ -127,12 +127,12 @@ def test_seeing_is_an_anytime_module(device):
     assert len(result.history) == 6
 
 
-@pytest.mark.parametrize(("exposures", "quality"), [(2, None), (3, 0.75), (5, 0.85)])
-def test_time_buys_exposures_and_exposures_buy_quality(exposures, quality):
+@pytest.mark.parametrize(("seconds", "quality"), [(0.9, None), (1.51, 0.75), (2.51, 0.85)])
+def test_time_buys_exposures_and_exposures_buy_quality(seconds, quality):
     vision = Vision(t_a=3, t_b=8, concave=False)
     clock = anytime.WorkClock(Machine("slow", {"see": Rate(per_work=0.5)}))
-    deadline = anytime.Deadline.after(0.5 * exposures - 0.01, clock)
-    result = anytime.run(see, Sensor(FREE, (45, 45), 12, vision), deadline=deadline)
+    sensor = Sensor(FREE, (45, 45), 12, vision)
+    result = anytime.run(see, sensor, deadline=anytime.Deadline.after(seconds, clock))
     seen = None if result.value is None else result.value.quality
     assert seen == (None if quality is None else pytest.approx(quality))
 
