@@ -36,9 +36,7 @@ def read_ros_map(path: str | os.PathLike[str]) -> GridMap:
             raise AnytimeError(f"{path}: no {key!r}; a ROS map names {', '.join(_KEYS)}")
 
     def refuse(key: str, right: str) -> NoReturn:
-        shown = repr(settings[key])
-        shown = shown if len(shown) <= 40 else shown[:37] + "..."
-        raise AnytimeError(f"{path}:{lines.get(key, 1)}: {key} is {shown}; {right}")
+        raise AnytimeError(f"{path}:{lines.get(key, 1)}: {key} is {_shown(settings[key])}; {right}")
 
     def number(key: str, low: float, high: float, right: str) -> float:
         value = _number(settings[key])
@@ -113,8 +111,9 @@ def _read_yaml(path: Path) -> tuple[dict[str, object], dict[str, int]]:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise AnytimeError(f"{path}:{line}: no yaml ({error.problem or 'syntax'})") from None
-    except (yaml.YAMLError, ValueError, RecursionError, OverflowError, TypeError):
+        problem = " ".join((error.problem or "syntax").split())[:80]
+        raise AnytimeError(f"{path}:{line}: no yaml ({problem})") from None
+    except Exception:  # yaml's constructors let through whatever int, float and date raise
         raise AnytimeError(f"{path}:1: no yaml; a ROS map is lines of 'key: value'") from None
     if not isinstance(settings, dict) or not isinstance(node, yaml.MappingNode):
         raise AnytimeError(f"{path}:1: no settings; a ROS map is lines of 'key: value'")
@@ -132,6 +131,22 @@ def _image_path(path: Path, image: object, refuse) -> Path:
     if picture.suffix.lower() != ".pgm":
         refuse("image", "it must be a PGM image, so convert it")
     return picture
+
+
+def _shown(value: object) -> str:
+    """A setting as an error shows it; never a nest of aliases, whose text can be endless."""
+    flat = isinstance(value, list) and len(value) < 5 and not any(map(_is_nest, value))
+    if _is_nest(value) and not flat:
+        return f"a {type(value).__name__}"
+    try:
+        text = repr(value)
+    except ValueError:  # Python does not print integers of thousands of digits
+        return "a number of thousands of digits"
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _is_nest(value: object) -> bool:
+    return isinstance(value, list | dict | set | tuple)
 
 
 def _number(value: object) -> float:

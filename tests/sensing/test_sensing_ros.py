@@ -98,6 +98,13 @@ def test_the_top_of_the_image_is_the_top_of_the_map(tmp_path):
         ({"mode": "!!python/object/apply:os.system [id]"}, ":7: no yaml"),
         ({"mode": "2001-99-99"}, "no yaml"),
         ({"mode": "{a: b"}, "no yaml"),
+        ({"mode": "!!int ''"}, "no yaml"),
+        ({"mode": "!!bool maybe"}, "no yaml"),
+        ({"mode": "!!timestamp today"}, "no yaml"),
+        ({"mode": "!<%0A> x"}, "no yaml"),
+        ({"mode": "1" * 5000}, "no yaml"),
+        ({"resolution": "1" * 4000}, "resolution is 111"),
+        ({"resolution": "0x" + "f" * 5000}, "resolution is a number of thousands of digits"),
     ],
 )
 def test_wrong_settings_are_refused_in_one_line(tmp_path, changed, complaint):
@@ -105,6 +112,15 @@ def test_wrong_settings_are_refused_in_one_line(tmp_path, changed, complaint):
     with pytest.raises(AnytimeError, match=complaint) as caught:
         read_map(path)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_nest_of_aliases_is_refused_before_it_unfolds(tmp_path):
+    nest = "a0: &a0 [1, 1]\n"
+    nest += "".join(f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 30))
+    path = write(tmp_path, origin=None, image=None)
+    path.write_text(nest + path.read_text() + "origin: *a29\nimage: *a29\n")
+    with pytest.raises(AnytimeError, match=r"origin is a list; it must be \[x, y, yaw\]"):
+        read_map(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"text", b"- 1\n- 2\n", b"\x00\x01", b"a" * 100_000])
