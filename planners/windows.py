@@ -275,6 +275,11 @@ def walk(free, cost, touched, columns, plan, start, goal, limit, work):
                 is_goal = False
                 break
             following += 1
+        # An abstract cell is advice: aim at the next but one, which smooths the way.
+        if not is_goal and level > 0 and following + 1 < count and plan[following + 1, 0] == level:
+            following += 1
+            top, left = int(plan[following, 1]) << level, int(plan[following, 2]) << level
+            bottom, right = min(top + (1 << level), rows), min(left + (1 << level), columns)
         if is_goal:
             top, left = goal // columns, goal % columns
             bottom, right = top + 1, left + 1
@@ -325,10 +330,13 @@ def walk(free, cost, touched, columns, plan, start, goal, limit, work):
 # its own level; segments meet in joints, each as fine as the finest segment that it bounds.
 LEVEL, FIRST, COUNT, LEFT, RIGHT, NEXT, FINAL, OBSTACLENESS = range(8)
 SEGMENTS, JOINTS, CELLS, HEAD_SEGMENT = range(4)
-# Positions of a segment; free and full obstacleness of a cell; cost of an abstract free cell.
-POSITIONS = 8
+# Positions of a segment; full obstacleness of a cell; cost of an abstract free cell.
+POSITIONS = 12
 FULL = 4096
 ABSTRACT = 16
+# Abstract cells cost more than a free one nearly everywhere, and an abstract length is a belief:
+# the exact A* would spend most of its work on comparing ways that do not really differ.
+ABSTRACT_PERCENT = 160
 
 
 class Refinement(NamedTuple):
@@ -459,12 +467,12 @@ def _find(pyramid, level, start, goal, margin, work):
         min(max(row, start_row) + margin + 1, rows),
         min(max(column, start_column) + margin + 1, columns),
     )
-    floor = 1 if level == 0 else ABSTRACT
+    floor, percent = (1, 100) if level == 0 else (ABSTRACT, ABSTRACT_PERCENT)
     target = (row, column, row + 1, column + 1)
     if cost[start] == WALL or cost[goal] == WALL:
         return np.empty(0, np.int32), 0
     found, expansions = window_search(
-        cost, WALL, columns, start, target, box, True, 100, floor, UNLIMITED, work
+        cost, WALL, columns, start, target, box, True, percent, floor, UNLIMITED, work
     )
     if found < 0:
         return np.empty(0, np.int32), expansions
