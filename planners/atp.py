@@ -54,7 +54,7 @@ class Step:
 
 
 def steps(
-    domain: NDArray[np.float32],
+    domain: NDArray[np.floating],
     start: Cell,
     goal: Cell,
     *,
