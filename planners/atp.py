@@ -91,12 +91,12 @@ def steps(
     work, straight = workspace(domain.size), _straight(start, goal)
     state, expansions = first_plan(pyramid, level, first, last, work)
     best = _multipath(state, pyramid, straight)
-    yield Step(expansions + streamed / _STREAMED_PER_EXPANSION, best)
+    yield Step(float(expansions + streamed / _STREAMED_PER_EXPANSION), best)
     done = False
     while not done:
         state, expansions, done = refine(state, pyramid, grain, work)
         plan = _multipath(state, pyramid, straight)
-        # A base level plan's length is known, an abstract one's only believed.
+        # The less abstract a plan is the more its length is known rather than believed.
         better = plan.length < best.length or (done and plan.level < best.level)
         best = plan if better else best
         if expansions or better:
@@ -126,7 +126,7 @@ def _straight(start: Cell, goal: Cell) -> float:
 
 def _multipath(state, pyramid: Pyramid, straight: float) -> MultiPath:
     plan, bounds, blocked, length = _flatten(state, pyramid)
-    return MultiPath(plan, bounds, blocked, max(length, straight), straight)
+    return MultiPath(plan, bounds, blocked, max(float(length), straight), straight)
 
 
 @njit(cache=True, nogil=True)
