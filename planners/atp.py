@@ -129,11 +129,19 @@ def _multipath(state, pyramid: Pyramid, straight: float) -> MultiPath:
     return MultiPath(plan, bounds, blocked, max(float(length), straight), straight)
 
 
-@njit(cache=True, nogil=True)
-def _abstract_cost(blocked):
-    """Return the cost of an abstract cell: length and obstacleness together."""
-    p = blocked / FULL
-    return min(_DEAREST, int(ABSTRACT * (1.0 + _LINEAR * p + _SQUARE * p * p) + 0.5))
+def _costs() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return the search cost of a base cell and of an abstract one by its obstacleness.
+
+    On the base level by the odds, abstractly by length and obstacleness together.
+    """
+    p = np.arange(FULL + 1) / FULL
+    odds = p[:-1] / (1.0 - p[:-1])
+    base = np.minimum(1.0 + 4.0 * odds, _DEAREST) + 0.5
+    abstract = ABSTRACT * (1.0 + _LINEAR * p + _SQUARE * p * p) + 0.5
+    return np.append(base, WALL).astype(np.uint8), abstract.astype(np.uint8)
+
+
+_BASE_COST, _ABSTRACT_COST = _costs()
 
 
 @njit(cache=True, nogil=True)
@@ -158,31 +166,28 @@ def _pyramid(domain, highest):
             p = float(domain[row, column])
             if not 0.0 <= p <= 1.0:
                 return pyramid, -1
-            there = row * columns + column
-            obstacleness[there] = int(p * FULL + 0.5)
-            if p == 0.0:
-                cost[there] = 1
-            elif p >= 1.0:
-                cost[there] = WALL
-            else:
-                cost[there] = int(min(float(_DEAREST), 1.0 + 4.0 * p / (1.0 - p)) + 0.5)
+            # Rounded down, so that only what is certain counts as full.
+            obstacleness[row * columns + column] = int(p * FULL)
+            cost[row * columns + column] = _BASE_COST[int(p * FULL)]
     for level in range(1, highest + 1):
-        below, here = offset[level - 1], offset[level]
-        low_columns, high_columns = widths[level - 1], widths[level]
-        low_rows = (here - below) // low_columns
+        below, here, width = offset[level - 1], offset[level], widths[level - 1]
+        height = (here - below) // width
         streamed += here - below
-        for row in range((low_rows + 1) // 2):
-            for column in range(high_columns):
-                total = 0
-                for child in range(4):
-                    r, c = 2 * row + (child >> 1), 2 * column + (child & 1)
-                    if r < low_rows and c < low_columns:
-                        total += obstacleness[below + r * low_columns + c]
-                    else:
-                        total += FULL
-                there = here + row * high_columns + column
-                obstacleness[there] = (total + 2) >> 2
-                cost[there] = _abstract_cost(obstacleness[there])
+        there = here
+        for row in range(0, height, 2):
+            for column in range(0, width, 2):
+                first = below + row * width + column
+                if row + 1 < height and column + 1 < width:
+                    total = obstacleness[first] + obstacleness[first + 1] + 2
+                    total += obstacleness[first + width] + obstacleness[first + width + 1]
+                else:
+                    # At the edge the diagonal one and at least one of these are outside.
+                    total = obstacleness[first] + FULL + 2
+                    total += obstacleness[first + 1] if column + 1 < width else FULL
+                    total += obstacleness[first + width] if row + 1 < height else FULL
+                obstacleness[there] = total >> 2
+                cost[there] = _ABSTRACT_COST[total >> 2]
+                there += 1
     return pyramid, streamed
 
 

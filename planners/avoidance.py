@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from planners.path_finding import Cell, flat, index_of, length_of
+from planners.path_finding import Cell, flat, index_of
 from planners.search import STRAIGHT, UNLIMITED, workspace
-from planners.windows import REACHED, UNREACHABLE
+from planners.windows import REACHED, UNREACHABLE, cells_of
 from planners.windows import walk as _walk
 
 # The longest level of a plan's cell: a block of 2^15 cells is wider than any map.
@@ -76,10 +76,10 @@ def walk(
         limit,
         workspace(world.size),
     )
-    cells = np.stack(np.divmod(path, np.int32(shape[1])), axis=1)
+    cells, diagonal = cells_of(path, shape[1])
     return Walk(
         cells=cells,
-        length=length_of(cells),
+        length=len(cells) - 1 - diagonal + diagonal * math.sqrt(2),
         reached=ending == REACHED,
         unreachable=ending == UNREACHABLE,
         expansions=int(expansions),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from planners.search import NO_PATH, UNLIMITED, WALL, Workspace, bucket_search, workspace
-from planners.windows import path_to, window_search
+from planners.windows import cells_of, path_to, window_search
 
 Cell = tuple[int, int]
 
@@ -153,12 +153,12 @@ def _read_back(
 
 
 def _path(cells: NDArray[np.int32], columns: int, cost: int, expansions: int) -> Path:
-    pairs = np.stack(np.divmod(cells, np.int32(columns)), axis=1)
-    return Path(pairs, length_of(pairs), cost, expansions)
+    pairs, diagonal = cells_of(cells, columns)
+    # Counted rather than summed, so that equal ways have equal lengths to the last bit.
+    return Path(pairs, len(pairs) - 1 - diagonal + diagonal * math.sqrt(2), cost, expansions)
 
 
 def length_of(cells: NDArray[np.integer]) -> float:
     """Return the length in cells of a way [n, 2] from neighbour to neighbour."""
-    # Counted rather than summed, so that equal ways have equal lengths to the last bit.
     diagonal = int(np.abs(np.diff(cells, axis=0)).sum()) - (len(cells) - 1)
     return len(cells) - 1 - diagonal + diagonal * math.sqrt(2)

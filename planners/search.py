@@ -83,21 +83,6 @@ def _unlink(node, f, after, before, bucket):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _offer(node, g, h, upper, base, label, after, before, bucket):
-    """Offer a way of length g to `node`; return by how much the open list grew."""
-    old = label[node]
-    if base - g <= old or g + h >= upper:
-        return 0
-    label[node] = base - g
-    opened = 1
-    if old > base - SPAN and before[node] != CLOSED:
-        _unlink(node, base - old + h, after, before, bucket)
-        opened = 0
-    _link(node, g + h, after, before, bucket)
-    return opened
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
     """A* over cells of equal cost; return (g at the goal or NO_PATH or OUT_OF_BUDGET, expansions).
 
@@ -171,13 +156,21 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
             if not usable:
                 continue
             there = node + dr * columns + dc
-            if side >= 4 and cost[there] == wall:
+            old, new = label[there], base - g - step
+            if new <= old or (side >= 4 and cost[there] == wall):
                 continue
             near, far = abs(down + dr), abs(across + dc)
             if near > far:
                 near, far = far, near
             h = STRAIGHT * far + minor * near
-            opened += _offer(there, g + step, h, upper, base, label, after, before, bucket)
+            if g + step + h >= upper:
+                continue
+            if old > base - SPAN and before[there] != CLOSED:
+                _unlink(there, base - old + h, after, before, bucket)
+            else:
+                opened += 1
+            label[there] = new
+            _link(there, g + step + h, after, before, bucket)
         if label[goal] > base - SPAN:
             upper = base - label[goal]
     if upper == SPAN:

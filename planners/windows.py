@@ -131,37 +131,69 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
             return OUT_OF_BUDGET, expansions
         expansions += 1
         g = base - label[node]
-        for dr in range(-1, 2):
-            if row + dr < top or row + dr >= bottom:
+        # Cells outside the window are walls; the orthogonal ones are read once for the diagonals.
+        north = int(cost[node - columns]) if row > top else wall
+        south = int(cost[node + columns]) if row + 1 < bottom else wall
+        west = int(cost[node - 1]) if column > left else wall
+        east = int(cost[node + 1]) if column + 1 < right else wall
+        for side in range(8 if diagonals else 4):
+            if side == 0:
+                swept, one, other, dr, dc = north, north, north, -1, 0
+            elif side == 1:
+                swept, one, other, dr, dc = south, south, south, 1, 0
+            elif side == 2:
+                swept, one, other, dr, dc = west, west, west, 0, -1
+            elif side == 3:
+                swept, one, other, dr, dc = east, east, east, 0, 1
+            elif side == 4:
+                swept, one, other, dr, dc = 0, north, west, -1, -1
+            elif side == 5:
+                swept, one, other, dr, dc = 0, north, east, -1, 1
+            elif side == 6:
+                swept, one, other, dr, dc = 0, south, west, 1, -1
+            else:
+                swept, one, other, dr, dc = 0, south, east, 1, 1
+            if one == wall or other == wall:
                 continue
-            for dc in range(-1, 2):
-                if column + dc < left or column + dc >= right:
+            there = node + dr * columns + dc
+            if side >= 4:
+                swept = int(cost[there])
+                if swept == wall:
                     continue
-                if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
-                    continue
-                there = node + dr * columns + dc
-                old = label[there]
-                known = old > base - SPAN
-                if known and slot[there] == CLOSED:
-                    continue
-                step = step_cost(cost, wall, columns, node, dr, dc)
-                if step == 0 or base - g - step <= old:
-                    continue
-                down = max(goal_top - row - dr, 0, row + dr - goal_bottom + 1)
-                across = max(goal_left - column - dc, 0, column + dc - goal_right + 1)
-                if diagonals:
-                    h = floor * octile(down, across)
-                else:
-                    h = floor * STRAIGHT * (down + across)
-                label[there] = base - g - step
-                key[there] = g + step + h * percent // 100
-                if known:
-                    place = int(slot[there])
-                else:
-                    place = size
-                    size += 1
-                _sift_up(place, there, heap, slot, key, label)
+            step = (STRAIGHT if side < 4 else DIAGONAL) * max(swept, one, other)
+            old = label[there]
+            if base - g - step <= old:
+                continue
+            known = old > base - SPAN
+            if known and slot[there] == CLOSED:
+                continue
+            down = max(goal_top - row - dr, 0, row + dr - goal_bottom + 1)
+            across = max(goal_left - column - dc, 0, column + dc - goal_right + 1)
+            if diagonals:
+                h = floor * octile(down, across)
+            else:
+                h = floor * STRAIGHT * (down + across)
+            label[there] = base - g - step
+            key[there] = g + step + h * percent // 100
+            if known:
+                place = int(slot[there])
+            else:
+                place = size
+                size += 1
+            _sift_up(place, there, heap, slot, key, label)
     return NO_PATH, expansions
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cells_of(path, columns):
+    """Return a path as int32 [n, 2] cells, and how many of its steps are diagonal."""
+    cells, diagonal = np.empty((path.size, 2), np.int32), 0
+    for place in range(path.size):
+        cells[place, 0] = path[place] // columns
+        cells[place, 1] = path[place] % columns
+        if place > 0 and cells[place, 0] != cells[place - 1, 0]:
+            diagonal += cells[place, 1] != cells[place - 1, 1]
+    return cells, diagonal
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
