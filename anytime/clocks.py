@@ -19,7 +19,11 @@ class Clock(Protocol):
         ...
 
     def spend(self, module: str, work: float, step: int | None) -> None:
-        """Account for `work` units of `module`; `step` is its index if it does not count its own."""
+        """Account for `work` units of `module`; `step`: its index, if it counts no work itself."""
+        ...
+
+    def advance(self, seconds: float) -> None:
+        """Let `seconds` pass."""
         ...
 
 
@@ -31,6 +35,9 @@ class WallClock:
 
     def spend(self, module: str, work: float, step: int | None) -> None:
         """Nothing to do: real time has passed already."""
+
+    def advance(self, seconds: float) -> None:
+        time.sleep(max(0.0, seconds))
 
 
 class WorkClock:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile, Recording
 from anytime.programs import Call, Input, Program
-from anytime.running import Result, Status, execute
+from anytime.running import Result, Run, Status, execute
 from compiler import baselines
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.explaining import Advice, Explanation, advise, explain
@@ -176,34 +176,49 @@ class CompiledProgram:
         if self.frontier.index(budget) < 0:
             why = f"{duration(budget)} is below the least budget, {duration(self.least)}"
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
-        return self._spend(self.allocate(budget), deadline, inputs, rng)
+        allocation = self.allocate(budget)
+        started = deadline.clock.now()
+        parts = dict(self.stages(allocation.shares, deadline, inputs, rng=rng))
+        return self._composed(allocation, deadline, started, parts)
 
-    def _spend(
+    def stages(
         self,
-        allocation: Allocation,
+        shares: Mapping[str, float],
         deadline: Deadline,
         inputs: Mapping[str, Any],
-        rng: np.random.Generator | None,
-    ) -> Result:
+        *,
+        rng: np.random.Generator | None = None,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> Iterator[tuple[str, Result]]:
+        """Run call after call and yield (label, result); the end of one without a result.
+
+        shares: seconds of each call, by label; the last call has all that is left. interrupted:
+        asked before each step of a generator; true ends the program.
+        """
         clock = deadline.clock
-        started = share_ends = clock.now()
+        share_ends = clock.now()
         parts: dict[str, Result] = {}
         for place, call in enumerate(self.program.calls):
             last = place == len(self.program.calls) - 1
-            share_ends += allocation.shares[call.label]
+            share_ends += shares[call.label]
             ends = deadline.at if last else min(share_ends, deadline.at)
-            least_rest = sum(table.first for table in self.tables[place + 1 :])
-            fed = [_value(argument, inputs, parts) for argument in call.arguments]
-            hard = deadline.at - least_rest
-            may_step = None
+            hard = deadline.at - sum(table.first for table in self.tables[place + 1 :])
+            held = None
             if call.module.generator and not last:
-                may_step = guard(self.steps.get(call.module.name), ends, hard)
-            # A generator with a guard is held to its share by it; others by their deadline.
-            own = Deadline(clock, hard if may_step else ends)
-            parts[call.label], _ = execute(call.module, tuple(fed), own, rng=rng, may_step=may_step)
-            if not parts[call.label]:
-                break
-        return self._composed(allocation, deadline, started, parts)
+                held = guard(self.steps.get(call.module.name), ends, hard)
+            # A generator with a guard is held to its share by it, the others by their deadline.
+            own = Deadline(clock, hard if held else ends)
+            may_step = held or Run.may_step
+            parts[call.label], _ = execute(
+                call.module,
+                tuple(_value(argument, inputs, parts) for argument in call.arguments),
+                own,
+                rng=rng,
+                may_step=lambda run, may=may_step: not interrupted() and may(run),
+            )
+            yield call.label, parts[call.label]
+            if not parts[call.label] or interrupted():
+                return
 
     def _composed(
         self,

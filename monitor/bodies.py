@@ -1,0 +1,59 @@
+"""The little that the monitor asks of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from anytime.clocks import Clock
+from monitor.states import Situation
+
+
+class Robot(Protocol):
+    """A body on a clock. Whoever lets time pass on the clock moves the robot too.
+
+    Nothing here blocks but `complete` and `work`.
+    """
+
+    @property
+    def clock(self) -> Clock: ...
+
+    def inputs(self) -> Mapping[str, Any]:
+        """The program's inputs for the next frame, as seen from where the robot is now."""
+        ...
+
+    def situation(self) -> Situation:
+        """How things stand now."""
+        ...
+
+    def begin(self, plan: Any, speed: float) -> None:
+        """Start to execute a plan at this speed; the robot must stand."""
+        ...
+
+    def change_speed(self, speed: float) -> None:
+        """Go on at another speed."""
+        ...
+
+    def learn(self, plan: Any) -> None:
+        """Take up what a plan's making found out, whether or not the plan is executed."""
+        ...
+
+    def complete(self) -> None:
+        """Let time pass until the plan in execution is finished or broken off."""
+        ...
+
+    def work(self, seconds: float) -> None:
+        """Do the job at the goal."""
+        ...
+
+    def stop(self) -> None:
+        """Stand still; never fails."""
+        ...
+
+    def driven(self) -> float:
+        """Seconds in motion so far."""
+        ...
+
+    def story(self) -> Mapping[str, Any]:
+        """What to log of the frame that just ended, as plain data."""
+        ...

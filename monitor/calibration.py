@@ -1,0 +1,129 @@
+"""Calibration: missions lived off line, so that the monitor foresees what really happens."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from compiler import CompiledProgram
+from monitor.bodies import Robot
+from monitor.inter_frame import Contracts, Spread
+from monitor.missions import Mission, Value
+from monitor.monitoring import Monitor
+from monitor.policies import Expected, constant
+from monitor.reports import Report
+from monitor.rhythms import Lived, Rhythm, rhythm_of
+
+MakeRobot = Callable[[], Robot]
+RATIOS = 9  # quantiles kept of real over foreseen time
+BINS = 3  # of foreseen time left
+
+
+def measure_rhythm(
+    program: CompiledProgram,
+    mission: Mission,
+    contracts: Contracts,
+    make_robot: MakeRobot,
+    *,
+    seeds: Sequence[int],
+    levels: int = 6,
+) -> Rhythm:
+    """The rhythm of a mission, from missions lived at constant sensing times.
+
+    levels: sensing times, spread over those of the contracts. Each is lived once for each seed.
+    """
+    sensing = np.unique(contracts.shares[:, 0])
+    chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
+    lived: list[Lived] = []
+    longest = float(contracts.shares[:, 1:].sum(axis=1).max())
+    endless = _without_deadline(mission)
+    for time in chosen:
+        shares = dict(zip(program.labels, [float(time)], strict=False))
+        rest = program.labels[1:]
+        shares.update({label: longest / max(len(rest), 1) for label in rest})
+        policy = constant(shares, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
+        for seed in seeds:
+            robot = make_robot()
+            route = robot.situation().to_go
+            report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
+            lived.append(_lived(float(time), route, report))
+    return rhythm_of(lived)
+
+
+def calibrate(
+    program: CompiledProgram,
+    mission: Mission,
+    contracts: Contracts,
+    rhythm: Rhythm,
+    make_robot: MakeRobot,
+    *,
+    seeds: Sequence[int],
+    rounds: int = 2,
+) -> Expected:
+    """The policy of expectation over how far the time left really was from the time foreseen.
+
+    It lives the mission for each seed, `rounds` times, the later ones with what it learnt.
+    """
+    policy = Expected(mission, contracts, rhythm, Spread())
+    endless = _without_deadline(mission)
+    for _ in range(rounds):
+        pairs: list[tuple[float, float]] = []
+        for seed in seeds:
+            monitor = Monitor(program, policy, "expected", rhythm)
+            pairs += _foreseen_and_real(monitor.run(endless, make_robot(), seed=seed))
+        policy = Expected(mission, contracts, rhythm, spread_of(pairs))
+    return policy
+
+
+def spread_of(pairs: Sequence[tuple[float, float]]) -> Spread:
+    """Quantiles of real / foreseen seconds left, in bins of equally many pairs."""
+    if not pairs:
+        return Spread()
+    foreseen, real = np.array(pairs).T
+    bounds = np.quantile(foreseen, np.arange(BINS) / BINS)
+    bounds[0] = 0.0
+    rows = np.searchsorted(bounds, foreseen, side="right") - 1
+    shares = (np.arange(RATIOS) + 0.5) / RATIOS
+    ratios = [
+        tuple(np.quantile((real / foreseen)[rows == row], shares).tolist())
+        for row in range(BINS)
+        if (rows == row).any()
+    ]
+    kept = [float(bounds[row]) for row in range(BINS) if (rows == row).any()]
+    return Spread(tuple(kept), tuple(ratios))
+
+
+def _foreseen_and_real(report: Report) -> list[tuple[float, float]]:
+    if not report:
+        return []
+    return [
+        (frame.decision.why.seconds, report.seconds - frame.started)
+        for frame in report.frames
+        if frame.decision.why.seconds > 0
+    ]
+
+
+def _without_deadline(mission: Mission) -> Mission:
+    """The mission as it would go on after its deadline."""
+    return replace(mission, value=Value("exponential", mission.value.worth, mission.value.seconds))
+
+
+def _lived(sensing: float, route: float, report: Report) -> Lived:
+    moving = [frame for frame in report.frames if not frame.standing]
+    estimates = [
+        call.estimate
+        for frame in report.frames
+        for call in frame.calls[1:]
+        if call.estimate is not None
+    ]
+    return Lived(
+        sensing=sensing,
+        route=route,
+        walked=sum(float(frame.story["length"]) for frame in moving),
+        planned=sum(float(frame.story["planned"]) for frame in moving),
+        moving=len(moving),
+        standing=len(report.frames) - len(moving),
+        estimate=float(np.mean(estimates)) if estimates else 0.0,
+    )

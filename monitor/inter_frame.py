@@ -1,0 +1,140 @@
+"""Inter-frame optimisation: the contract time of the next frame. [ZR93] §5."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compiler import CompiledProgram
+from compiler.baselines import maximal_shares, minimal_shares
+from compiler.division import expected_quality, moments_within
+from monitor.missions import Mission
+from monitor.rhythms import Rhythm
+from monitor.states import Decision, State, Why
+
+Floats = NDArray[np.float64]
+CONTRACTS = 24  # considered at each decision, at most
+SPEEDS = 19
+
+
+@dataclass(frozen=True)
+class Contracts:
+    """The contracts to choose from.
+
+    labels: of the calls. shares: [C, n] seconds of each call; the first call senses.
+    efficiency: [C] expected quality of the plan over what unlimited planning would give on the
+    same sensing; the frame is expected to be longer by its inverse.
+    """
+
+    labels: tuple[str, ...]
+    shares: Floats
+    efficiency: Floats
+
+    @property
+    def seconds(self) -> Floats:
+        """The contract times, [C]."""
+        return self.shares.sum(axis=1)
+
+    def decision(self, index: int, speed: float, why: Why) -> Decision:
+        """The decision for one of them."""
+        shares = dict(zip(self.labels, self.shares[index].tolist(), strict=True))
+        return Decision(shares, speed, why)
+
+
+def compiled_contracts(program: CompiledProgram) -> Contracts:
+    """The divisions that the compiler found worth having."""
+    count = len(program.frontier.budgets)
+    chosen = np.unique(np.linspace(0, count - 1, min(CONTRACTS, count)).round().astype(int))
+    return _contracts(program, program.frontier.shares[chosen])
+
+
+def pinned_contracts(program: CompiledProgram, extreme: str) -> Contracts:
+    """The same program with sensing pinned to its least ("min") or greatest ("max") useful time."""
+    shares_of = minimal_shares if extreme == "min" else maximal_shares
+    pinned = shares_of(program.tables, 0.0)[:-1]
+    last = program.tables[-1]
+    gained = last.expected.reshape(-1, len(last.times)).mean(axis=0)
+    useful = last.times[np.flatnonzero(np.diff(np.maximum.accumulate(gained), prepend=0.0) > 1e-9)]
+    count = min(CONTRACTS, len(useful))
+    chosen = useful[np.unique(np.linspace(0, len(useful) - 1, count).round().astype(int))]
+    return _contracts(program, np.array([[*pinned, seconds] for seconds in chosen]))
+
+
+def _contracts(program: CompiledProgram, shares: Floats) -> Contracts:
+    quality = [
+        expected_quality(program.tables, moments_within(program.tables, row)) for row in shares
+    ]
+    unlimited = [
+        expected_quality(program.tables, moments_within(program.tables, [*row[:-1], np.inf]))
+        for row in shares
+    ]
+    ratio = np.array(quality) / np.maximum(unlimited, 1e-9)
+    return Contracts(program.labels, shares, np.clip(ratio, 0.05, 1.0))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far the time that is left really is from the time foreseen.
+
+    beyond: [B] foreseen seconds left from which each row of ratios holds, increasing from 0.
+    ratios: [B, R] real over foreseen, equally likely.
+    """
+
+    beyond: tuple[float, ...] = (0.0,)
+    ratios: tuple[tuple[float, ...], ...] = ((1.0,),)
+
+    def at(self, seconds: float) -> Floats:
+        """The ratios for this much time left, [R]."""
+        row = int(np.searchsorted(self.beyond, seconds, side="right")) - 1
+        return np.array(self.ratios[max(row, 0)])
+
+
+def foresee(
+    mission: Mission, contracts: Contracts, rhythm: Rhythm, state: State, speeds: Floats
+) -> tuple[Floats, Floats]:
+    """Seconds and energy left for every contract and speed, ([C, V], [C, V]).
+
+    Frame k + 1 is computed while frame k is executed, so a frame takes the longer of both; the
+    last one is executed without computing another.
+    """
+    situation = state.situation
+    per_length, length, stops = (row[:, None] for row in rhythm.at(contracts.shares[:, 0]))
+    length = length / contracts.efficiency[:, None]
+    contract = contracts.seconds[:, None]
+    frames = per_length * situation.to_go
+    drive = length / speeds
+    longer = np.maximum(contract, drive)
+    in_hand = rhythm.stretched(situation.in_hand, state.made_on) / speeds
+    thinking = situation.to_go > 0
+    begun = np.maximum(contract * thinking, in_hand)
+    seconds = begun + np.maximum(frames - 1.0, 0.0) * longer + np.minimum(frames, 1.0) * drive
+    seconds = seconds + stops * frames * contract + mission.job
+    moving = in_hand + frames * drive
+    energy = moving * mission.energy.power(speeds) + mission.energy.idle * (seconds - moving)
+    return seconds, energy
+
+
+def best_contract(
+    mission: Mission, contracts: Contracts, rhythm: Rhythm, spread: Spread, state: State
+) -> Decision:
+    """t_c = argmax VOT − COE, with the speed chosen together with it. [ZR93] §5."""
+    speeds = np.geomspace(*mission.speeds, SPEEDS)
+    seconds, energy = foresee(mission, contracts, rhythm, state, speeds)
+    ratios = spread.at(float(np.median(seconds)))
+    value = mission.value(state.time + seconds[..., None] * ratios).mean(axis=-1)
+    used = state.situation.energy + energy * ratios.mean()
+    cost = mission.energy.price * used
+    net = value - cost
+    row, column = np.unravel_index(int(np.argmax(net)), net.shape)
+    best = net.max(axis=1)
+    why = Why(
+        float(value[row, column]),
+        float(cost[row, column]),
+        float(seconds[row, column]),
+        tuple(zip(contracts.seconds.tolist(), best.tolist(), strict=True)),
+        "inter-frame",
+    )
+    return contracts.decision(int(row), float(speeds[column]), why)
+

@@ -1,0 +1,228 @@
+"""The run-time monitor: spends a mission's time frame by frame. [ZR93] §5."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from anytime.clocks import Deadline
+from anytime.running import Fault, Result
+from compiler import CompiledProgram
+from monitor.bodies import Robot
+from monitor.endings import Ending
+from monitor.missions import Mission
+from monitor.policies import Policy
+from monitor.reports import CallRecord, Frame, Moment, Report
+from monitor.rhythms import Rhythm
+from monitor.states import Decision, Situation, State
+
+FAILURES = 3  # frames without a plan, one after the other, that end a mission
+Listener = Callable[[Frame], None]
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """Runs missions of a robot with a compiled program and a policy.
+
+    `decide` is pure: the same state, the same decision. `run` is a loop over it and never raises.
+    """
+
+    program: CompiledProgram
+    policy: Policy
+    name: str = "expected"
+    rhythm: Rhythm | None = None
+
+    def decide(self, state: State) -> Decision:
+        """The decision in a state."""
+        return self.policy(state)
+
+    def promise(self, robot: Robot) -> float:
+        """The net value to expect of a mission that is presented now."""
+        state = State("frame", 0.0, robot.situation(), standing=True)
+        return self.decide(state).why.net
+
+    def run(
+        self, mission: Mission, robot: Robot, *, seed: int = 0, listen: Listener | None = None
+    ) -> Report:
+        """Live a mission to one of the endings of the closed set.
+
+        seed: of everything random in the modules. listen: called with each frame when it is over.
+        """
+        life = _Life(self, mission, robot, seed, listen)
+        fault = ""
+        try:
+            ending = life.live()
+        except KeyboardInterrupt:
+            ending = Ending.ABORTED
+        except Exception as error:
+            ending, fault = Ending.INTERNAL, str(Fault.of(error))
+        finally:
+            robot.stop()
+        return life.report(ending, fault)
+
+
+class _Life:
+    """A mission in progress."""
+
+    def __init__(
+        self, monitor: Monitor, mission: Mission, robot: Robot, seed: int, listen: Listener | None
+    ) -> None:
+        self.monitor, self.mission, self.robot, self.seed = monitor, mission, robot, seed
+        self.listen = listen or (lambda frame: None)
+        self.frames: list[Frame] = []
+        self.presented = robot.clock.now()
+        self.promised = float("nan")
+        self.job = 0.0
+
+    def live(self) -> Ending:
+        plan: Any = None
+        made_on, failures = 0.0, 0
+        while True:
+            if plan is not None:
+                self.robot.begin(plan, self.mission.speeds[0])
+            situation = self.robot.situation()
+            if situation.ending is Ending.REACHED:
+                self.robot.work(self.mission.job)
+                self.job = self.mission.job
+                return Ending.REACHED if self.time() <= self.mission.value.deadline else Ending.DEADLINE
+            if situation.ending is not None:
+                return situation.ending
+            if self.time() >= self.mission.value.deadline:
+                return Ending.DEADLINE
+            plan, made_on, had_result = self.frame(plan is None, situation, made_on)
+            failures = 0 if had_result else failures + 1
+            if failures >= FAILURES:
+                return Ending.MODULES_FAILED
+
+    def time(self) -> float:
+        """Seconds since the task was presented."""
+        return self.robot.clock.now() - self.presented
+
+    def frame(
+        self, standing: bool, situation: Situation, made_on: float
+    ) -> tuple[Any, float, bool]:
+        """Execute the plan in hand and make the next; returns it (None if it is of no use), the
+        seconds of sensing behind it, and whether the modules had a result."""
+        started, energy, driven = self.time(), situation.energy, self.robot.driven()
+        state = State("frame", started, situation, standing, made_on, frame_started=started)
+        decision = self.monitor.decide(state)
+        if not self.frames:
+            self.promised = decision.why.net
+        moments = [Moment(started, "frame", decision)]
+        self.robot.change_speed(decision.speed)
+        last_frame = not standing and situation.to_go <= 0
+        results: dict[str, Result] = {}
+        records: list[CallRecord] = []
+        if not last_frame:
+            self.think(state, decision, moments, results, records)
+        self.robot.complete()
+        after = self.robot.situation()
+        interrupted = after.interrupted and not standing
+        result = results.get(self.monitor.program.program.output.label)
+        plan = result.value if result else None
+        self.frames.append(
+            Frame(
+                index=len(self.frames),
+                started=started,
+                ended=self.time(),
+                standing=standing,
+                moments=tuple(moments),
+                calls=tuple(records),
+                driven=self.robot.driven() - driven,
+                energy=after.energy - energy,
+                interrupted=interrupted,
+                story=self.robot.story(),
+            )
+        )
+        self.listen(self.frames[-1])
+        if plan is not None:
+            self.robot.learn(plan)
+        sensed = results.get(self.monitor.program.labels[0])
+        usable = None if interrupted else plan
+        had_result = last_frame or interrupted or plan is not None
+        return usable, sensed.elapsed if sensed else 0.0, had_result
+
+    def think(
+        self,
+        state: State,
+        decision: Decision,
+        moments: list[Moment],
+        results: dict[str, Result],
+        records: list[CallRecord],
+    ) -> None:
+        """Run the program for its contract, deciding again after each call."""
+        program, clock = self.monitor.program, self.robot.clock
+        deadline = Deadline.after(decision.contract, clock)
+        rng = np.random.default_rng([self.seed, len(self.frames)])
+        began = self.time()
+        stages = program.stages(
+            decision.shares,
+            deadline,
+            self.robot.inputs(),
+            rng=rng,
+            interrupted=lambda: not state.standing and self.robot.situation().interrupted,
+        )
+        for label, result in stages:
+            results[label] = result
+            estimate = result.history[-1].estimate if result.history else None
+            advertised = self.advertised(label, results)
+            records.append(
+                CallRecord(
+                    label,
+                    began,
+                    result.elapsed,
+                    decision.shares[label],
+                    result.overrun,
+                    result.status.value,
+                    advertised,
+                    estimate,
+                    str(result.fault) if result.fault else None,
+                )
+            )
+            began = self.time()
+            situation = self.robot.situation()
+            if state.standing or situation.interrupted:  # nothing to steer
+                continue
+            now = replace(
+                state,
+                moment="call",
+                time=began,
+                situation=situation,
+                advertised=advertised,
+                seen=estimate,
+                contract=moments[-1].decision,
+            )
+            again = self.monitor.decide(now)
+            if again.speed != moments[-1].decision.speed:
+                self.robot.change_speed(again.speed)
+                moments.append(Moment(began, "call", again))
+
+    def advertised(self, label: str, results: Mapping[str, Result]) -> float | None:
+        """What the rhythm lets expect of the estimate of a plan; None for other calls."""
+        labels = self.monitor.program.labels
+        if self.monitor.rhythm is None or label != labels[-1]:
+            return None
+        return self.monitor.rhythm.advertised(results[labels[0]].elapsed)
+
+    def report(self, ending: Ending, fault: str) -> Report:
+        seconds = self.time()
+        energy = self.robot.situation().energy
+        reached = ending is Ending.REACHED
+        return Report(
+            mission=self.mission.name,
+            policy=self.monitor.name,
+            seed=self.seed,
+            ending=ending,
+            promised=self.promised,
+            net=self.mission.net(reached, seconds, energy),
+            earned=float(self.mission.value(seconds)) if reached else 0.0,
+            seconds=seconds,
+            energy=energy,
+            job=self.job,
+            frames=tuple(self.frames),
+            machine=self.monitor.program.machine,
+            fault=fault,
+        )

@@ -1,0 +1,118 @@
+"""What became of a mission: frames, decisions, a ledger of time that adds up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from anytime.pictures import duration, sparkline
+from monitor.endings import Ending
+from monitor.states import Decision
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A decision and when it was made, in seconds since the task was presented."""
+
+    time: float
+    moment: str
+    decision: Decision
+
+
+@dataclass(frozen=True)
+class CallRecord:
+    """One call of the program in a frame."""
+
+    label: str
+    started: float
+    elapsed: float
+    share: float
+    overrun: float
+    status: str
+    advertised: float | None
+    estimate: float | None
+    fault: str | None
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: sensing and planning for the next while this one is executed."""
+
+    index: int
+    started: float
+    ended: float
+    standing: bool
+    moments: tuple[Moment, ...]
+    calls: tuple[CallRecord, ...]
+    driven: float
+    energy: float
+    interrupted: bool
+    story: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def decision(self) -> Decision:
+        return self.moments[0].decision
+
+    @property
+    def waited(self) -> float:
+        """Seconds in which the robot stood."""
+        return self.ended - self.started - self.driven
+
+
+@dataclass(frozen=True)
+class Report:
+    """The outcome of a mission.
+
+    promised: net value computed when the task was presented. net: what it was really worth.
+    seconds: completion or ending time; energy used; job: seconds of work at the goal.
+    """
+
+    mission: str
+    policy: str
+    seed: int
+    ending: Ending
+    promised: float
+    net: float
+    earned: float
+    seconds: float
+    energy: float
+    job: float
+    frames: tuple[Frame, ...]
+    machine: str = ""
+    fault: str = ""
+
+    @property
+    def ledger(self) -> dict[str, float]:
+        """Where the time went: driving + waiting + the job is all of it; below, what thinking took."""
+        spent: dict[str, float] = {
+            "drive": sum(frame.driven for frame in self.frames),
+            "wait": sum(frame.waited for frame in self.frames),
+            "job": self.job,
+        }
+        for frame in self.frames:
+            for call in frame.calls:
+                spent[call.label] = spent.get(call.label, 0.0) + call.elapsed
+        spent["overrun"] = sum(call.overrun for frame in self.frames for call in frame.calls)
+        return spent
+
+    def __bool__(self) -> bool:
+        return self.ending is Ending.REACHED
+
+    def __repr__(self) -> str:
+        head = (
+            f"{self.mission}, {self.policy}, seed {self.seed}: {self.ending.value} after "
+            f"{duration(self.seconds)}, net value {self.net:.1f} (promised {self.promised:.1f})"
+        )
+        ledger = ", ".join(f"{name} {duration(spent)}" for name, spent in self.ledger.items())
+        contracts = [frame.decision.contract for frame in self.frames]
+        longest = max(contracts, default=1.0) or 1.0
+        lines = [
+            head,
+            f"  {len(self.frames)} frames, contract times {sparkline(contracts, 0, longest)}"
+            f" up to {duration(longest)}",
+            f"  {ledger}",
+        ]
+        if self.fault:
+            lines.append(f"  fault: {self.fault}")
+        return "\n".join(line[:100] for line in lines)

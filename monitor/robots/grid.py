@@ -1,0 +1,217 @@
+"""The grid robot: a simulated body on a floor of cells, with variable speed. [ZR93] §3, §5."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anytime.clocks import Clock
+from anytime.errors import AnytimeError
+from monitor.endings import Ending
+from monitor.missions import Energy
+from monitor.states import Situation
+from planners.navigation import FramePlan, NoWay, Place, follow, travel_cost
+from planners.path_finding import Cell, astar, route
+from sensing import Belief
+from sensing.vision import Device, Sensor, Vision
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A floor and a way across it.
+
+    free: bool [rows, columns], the truth. start, goal: (row, column). radius: of sensing, in cells.
+    frame: length of a frame in cells, at most half the radius. device: what the robot looks with.
+    density: prior probability that a cell is blocked.
+    """
+
+    free: NDArray[np.bool_]
+    start: Cell
+    goal: Cell
+    radius: int = 32
+    frame: float = 16.0
+    device: Device = Vision()
+    density: float = 0.2
+    name: str = "floor"
+
+    def __post_init__(self) -> None:
+        rows, columns = self.free.shape
+        for name, (row, column) in (("start", self.start), ("goal", self.goal)):
+            if not (0 <= row < rows and 0 <= column < columns):
+                raise AnytimeError(
+                    f"{name} ({row}, {column}) is off the map {self.name!r} of {rows} rows and "
+                    f"{columns} columns"
+                )
+            if not self.free[row, column]:
+                raise AnytimeError(
+                    f"{name} ({row}, {column}) is inside an obstacle of the map {self.name!r}; "
+                    "choose a free cell"
+                )
+        if self.radius < 2 or not 1 <= self.frame <= self.radius / 2:
+            raise AnytimeError(
+                f"frame {self.frame} and radius {self.radius}: a frame is 1 cell to half the radius"
+            )
+
+    @property
+    def optimal(self) -> float:
+        """Length of the shortest way in cells; inf if there is none."""
+        way = astar(self.free, self.start, self.goal)
+        return float("inf") if way is None else way.length
+
+
+class GridRobot:
+    """Walks plans by bumping its way along them, and believes what it sensed and touched.
+
+    It is where the clock says: its place is computed when it is asked for.
+    """
+
+    def __init__(self, scene: Scene, energy: Energy, clock: Clock) -> None:
+        self.scene = scene
+        self.clock = clock
+        self.belief = Belief((scene.free.shape[0], scene.free.shape[1]), scene.density)
+        self.belief.touch_around(scene.start, scene.free)
+        self.cell = scene.start
+        self.walked = 0.0
+        self._energy_model = energy
+        self._energy = 0.0
+        self._driven = 0.0
+        self._plan: FramePlan | None = None
+        self._executed: FramePlan | None = None  # since the last story
+        self._path = np.array([scene.start], np.int32)  # of the walk in progress, or the last one
+        self._along = np.zeros(1)
+        self._done = 0.0  # length of it that is walked
+        self._speed = 1.0
+        self._since = clock.now()
+        self._interrupted = False
+        self._ending: Ending | None = Ending.REACHED if scene.start == scene.goal else None
+        self._to_go = self._route_from(scene.start)
+
+    def inputs(self) -> Mapping[str, Any]:
+        self._settle()
+        here = self.at()
+        start = self._plan.sub_goal if self._plan is not None else here
+        scene = self.scene
+        place = Place(self.belief, start, scene.goal, here, scene.radius, scene.frame)
+        return {"sensor": Sensor(scene.free, here, scene.radius, scene.device), "place": place}
+
+    def situation(self) -> Situation:
+        self._settle()
+        in_hand = 0.0
+        if self._plan is not None and self._along[-1] > 0:
+            in_hand = self._plan.length * (1.0 - min(1.0, self._done / self._plan.length))
+        return Situation(self._energy, self._to_go, in_hand, self._interrupted, self._ending)
+
+    def at(self) -> Cell:
+        """The cell where the robot is now."""
+        self._settle()
+        index = int(np.searchsorted(self._along, self._done + 1e-9, side="right")) - 1
+        row, column = self._path[index]
+        return int(row), int(column)
+
+    def learn(self, plan: FramePlan | NoWay) -> None:
+        """Take over the belief that the plan was made with; what was touched since stays known."""
+        if isinstance(plan, NoWay):
+            return
+        touched, odds = self.belief.touched, self.belief.log_odds
+        self.belief = plan.belief.copy()
+        np.copyto(self.belief.log_odds, odds, where=touched)
+        np.copyto(self.belief.touched, True, where=touched)
+        if self._plan is None and not self._interrupted:
+            self._to_go = plan.route_left
+        if self._interrupted:
+            self._to_go = self._route_from(self.cell)
+
+    def begin(self, plan: FramePlan | NoWay, speed: float) -> None:
+        self._settle()
+        if isinstance(plan, NoWay):
+            self._ending = Ending.UNREACHABLE
+            return
+        walk = follow(self.scene.free, plan, self.cell)
+        self._plan = self._executed = plan
+        self._path = walk.cells
+        steps = np.abs(np.diff(walk.cells, axis=0)).sum(axis=1)
+        self._along = np.concatenate([[0.0], np.cumsum(np.where(steps == 2, np.sqrt(2.0), 1.0))])
+        self._done = 0.0
+        self._speed = speed
+        self._interrupted = False
+        self._to_go = plan.route_left
+        self._since = self.clock.now()
+
+    def change_speed(self, speed: float) -> None:
+        self._settle()
+        self._speed = speed
+
+    def complete(self) -> None:
+        self._settle()
+        while self._plan is not None:
+            left = float(self._along[-1] - self._done) / self._speed
+            self.clock.advance(max(left, 1e-9))
+            self._settle()
+
+    def work(self, seconds: float) -> None:
+        self._settle()
+        self.clock.advance(seconds)
+        self._settle()
+
+    def stop(self) -> None:
+        self._settle()
+        self._plan = None
+
+    def driven(self) -> float:
+        self._settle()
+        return self._driven
+
+    def story(self) -> Mapping[str, Any]:
+        """Of the frame just ended: cells walked [m, 2], lengths planned and walked in cells, cells
+        of the plan [n, 3] with their levels; and the belief now."""
+        plan, self._executed = self._executed, None
+        return {
+            "path": self._path.tolist() if plan else [list(self.cell)],
+            "length": float(self._along[-1]) if plan else 0.0,
+            "planned": plan.length if plan else 0.0,
+            "plan": plan.plan.plan.tolist() if plan else [],
+            "belief": self.belief,
+        }
+
+    def _settle(self) -> None:
+        """Bring place and energy up to now."""
+        now = self.clock.now()
+        passed = now - self._since
+        self._since = now
+        if passed < 0:
+            return
+        moving = 0.0
+        if self._plan is not None:
+            left = float(self._along[-1] - self._done) / self._speed
+            moving = min(passed, left)
+            self._done = min(float(self._along[-1]), self._done + moving * self._speed)
+        self._driven += moving
+        model = self._energy_model
+        self._energy += moving * float(model.power(self._speed)) + (passed - moving) * model.idle
+        if self._plan is not None and self._done >= self._along[-1] - 1e-9:
+            self._arrive()
+
+    def _arrive(self) -> None:
+        plan = self._plan
+        assert plan is not None
+        self._plan = None
+        self.walked += float(self._along[-1])
+        self.belief.touch_around(self._path, self.scene.free)
+        self.cell = int(self._path[-1, 0]), int(self._path[-1, 1])
+        self._interrupted = self.cell != plan.sub_goal
+        if self.cell == self.scene.goal:
+            self._interrupted = False
+            self._ending = Ending.REACHED
+        if self._interrupted:
+            self._to_go = self._route_from(self.cell)
+
+    def _route_from(self, cell: Cell) -> float:
+        way = route(travel_cost(self.belief), cell, self.scene.goal, 2.0)
+        if way is None:
+            self._ending = self._ending or Ending.UNREACHABLE
+            return float("inf")
+        return way.length

@@ -1,0 +1,83 @@
+"""What the monitor sees and what it decides: plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from monitor.endings import Ending
+
+Moment = Literal["frame", "call"]
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What a robot reports of itself, in its own lengths.
+
+    energy: used so far. to_go: length of the route beyond the hand-over, or from where it stands
+    when there is no plan in hand. in_hand: planned length of the plan in execution that is left.
+    interrupted: the plan in execution was broken off. ending: set when the robot's part is over.
+    """
+
+    energy: float
+    to_go: float
+    in_hand: float
+    interrupted: bool = False
+    ending: Ending | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """The state that a decision is made in.
+
+    moment: "frame" when a frame begins, "call" when a call of the program has ended in it.
+    time: seconds since the task was presented. standing: there is no plan to execute.
+    made_on: seconds that the sensing behind the plan in hand had.
+    advertised, seen: expected quality of what was just computed by its profile, and its estimate;
+    None where there is none. contract: the decision in force.
+    """
+
+    moment: Moment
+    time: float
+    situation: Situation
+    standing: bool
+    made_on: float = 0.0
+    advertised: float | None = None
+    seen: float | None = None
+    frame_started: float = 0.0
+    contract: Decision | None = None
+
+
+@dataclass(frozen=True)
+class Why:
+    """The numbers behind a decision.
+
+    value, cost: expected value of the task and cost of energy (VOT and COE of [ZR93] §5).
+    seconds: foreseen to be left, before the spread of what really happens. curve: (contract seconds, net value) of the best decision
+    for each contract time. case: which rule decided within a frame.
+    """
+
+    value: float = 0.0
+    cost: float = 0.0
+    seconds: float = 0.0
+    curve: tuple[tuple[float, float], ...] = ()
+    case: str = ""
+
+    @property
+    def net(self) -> float:
+        return self.value - self.cost
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Seconds for each call of the program in the frame, and the speed of execution."""
+
+    shares: Mapping[str, float]
+    speed: float
+    why: Why = field(default_factory=Why)
+
+    @property
+    def contract(self) -> float:
+        """The contract time t_c of the frame."""
+        return sum(self.shares.values())
