@@ -35,7 +35,7 @@ HIGHEST_LEVEL = 3
 # Fewer abstract positions than this between start and goal are no plan: begin a level lower.
 _FEWEST_POSITIONS = 4
 # Expansions between two yields, so that steps cost about the same and Python's share stays small.
-_GRAIN = 32
+_GRAIN = 16
 # A streamed cell is worth 1/256 of an expansion, in all places where work is counted.
 _STREAMED_PER_EXPANSION = 256
 # How much longer than planned a robot walks that bumps its way through obstacleness p: fitted to
@@ -96,8 +96,8 @@ def steps(
     while not done:
         state, expansions, done = refine(state, pyramid, grain, work)
         plan = _multipath(state, pyramid, straight)
-        # The less abstract a plan is the more its length is known rather than believed.
-        better = plan.length < best.length or (done and plan.level < best.level)
+        # A base level plan's length is known, an abstract one's only believed.
+        better = plan.length < best.length or (done and plan.level == 0 < best.level)
         best = plan if better else best
         if expansions or better:
             yield Step(float(expansions), plan if better else None)

@@ -235,6 +235,8 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
 # of a plan is given up after the second window; the goal is given up only after the whole map.
 MARGIN, WIDER, ADVICE = 8, 4, 32
 REACHED, LEASHED, UNREACHABLE = 0, 1, 2
+# What a cell costs that is as likely free as blocked.
+EVEN_ODDS = 5
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -246,6 +248,19 @@ def _touch(free, cost, touched, columns, node):
             there = there_row * columns + there_column
             touched[there] = 1
             cost[there] = 1 if free[there] else WALL
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _doubtful(cost, columns, path, longest):
+    """Tell whether a path is longer than that or goes through what is believed an obstacle."""
+    length = 0
+    for place in range(1, path.size):
+        before, node = path[place - 1], path[place]
+        if cost[node] > EVEN_ODDS:
+            return True
+        straight = before // columns == node // columns or before % columns == node % columns
+        length += STRAIGHT if straight else DIAGONAL
+    return length > longest
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -269,11 +284,11 @@ def _approach(cost, columns, node, target, is_goal, work):
         )
         expansions += taken
         last = whole or (not is_goal and margin >= ADVICE)
-        # A way that is hardly longer than the straight one is not beaten outside the window.
-        if found >= 0 and (
-            last or work.clock[0] - work.label[found] <= ahead + 2 * margin * STRAIGHT
-        ):
-            return path_to(cost, WALL, columns, node, found, True, work), expansions
+        if found >= 0:
+            path = path_to(cost, WALL, columns, node, found, True, work)
+            # What lies outside the window matters only to a long detour or a believed obstacle.
+            if last or not _doubtful(cost, columns, path, ahead + 2 * margin * STRAIGHT):
+                return path, expansions
         if last:
             return np.empty(0, np.int32), expansions
         margin *= WIDER
@@ -369,6 +384,8 @@ ABSTRACT = 16
 # Abstract cells cost more than a free one nearly everywhere, and an abstract length is a belief:
 # the exact A* would spend most of its work on comparing ways that do not really differ.
 ABSTRACT_PERCENT = 160
+# How much wider the window is in which a segment is tried again as a whole when a half has failed.
+RETRY = 4
 
 
 class Refinement(NamedTuple):
@@ -563,7 +580,8 @@ def _worst(plan):
 def refine(plan, pyramid, grain, work):
     """REFINE the WORST-SEGMENT until `grain` expansions are spent: (plan, expansions, done).
 
-    A half that has no path one level down stays as it is and is never tried again.
+    Where a half has no path one level down the whole is tried in a wider window; what then still
+    has none stays as it is and is never tried again.
     """
     expansions = 0
     while expansions < grain:
@@ -582,19 +600,29 @@ def refine(plan, pyramid, grain, work):
         _descend(plan, pyramid, right, level - 1, middle, right)
         if halves == 2:
             _descend(plan, pyramid, middle, level - 1, left, right)
-        before = -1
+        columns = pyramid.columns[level - 1]
+        ends = (
+            _project(plan, left, level - 1, columns),
+            _project(plan, middle, level - 1, columns),
+            _project(plan, right, level - 1, columns),
+        )
+        path, taken = _find(pyramid, level - 1, ends[0], ends[1], POSITIONS, work)
+        expansions += taken
+        rest = path
+        if halves == 2:
+            rest, taken = _find(pyramid, level - 1, ends[1], ends[2], POSITIONS, work)
+            expansions += taken
+        if path.size == 0 or rest.size == 0:
+            # The joint between the halves may lie in a pocket, or the way round be long.
+            whole, taken = _find(pyramid, level - 1, ends[0], ends[2], RETRY * POSITIONS, work)
+            expansions += taken
+            if whole.size > 0:
+                path, middle, halves = whole, right, 1
+        before = worst
         for half in range(halves):
             one, other = left if half == 0 else middle, right if half == halves - 1 else middle
-            columns = pyramid.columns[level - 1]
-            path, taken = _find(
-                pyramid,
-                level - 1,
-                _project(plan, one, level - 1, columns),
-                _project(plan, other, level - 1, columns),
-                POSITIONS,
-                work,
-            )
-            expansions += taken
+            if half == 1:
+                path = rest
             if path.size > 0:
                 plan, number = _add_segment(plan, pyramid, level - 1, path, one, other)
             else:
@@ -606,7 +634,6 @@ def refine(plan, pyramid, grain, work):
             if half == 0:
                 # The first half takes the parent's place, so that whoever links to it still does.
                 plan.segment[worst] = plan.segment[number]
-                before = worst
             else:
                 plan.segment[before, NEXT] = number
                 before = number
