@@ -56,11 +56,10 @@ class ProfileLibrary(Mapping[str, Profile]):
         moved = {name: profile.on(machine) for name, profile in self._profiles.items()}
         return ProfileLibrary(profiles=moved, machine=machine)
 
-    def with_profile(self, profile: Profile) -> ProfileLibrary:
-        """This library with one profile added or replaced."""
-        return ProfileLibrary(
-            profiles={**self._profiles, profile.module: profile}, machine=self.machine
-        )
+    def updated(self, other: ProfileLibrary) -> ProfileLibrary:
+        """This library with the profiles and rates of another one added or replaced."""
+        machine = Machine(other.machine.name, {**self.machine.rates, **other.machine.rates})
+        return ProfileLibrary(profiles={**self._profiles, **other._profiles}, machine=machine)
 
     def save(self, folder: str | Path) -> None:
         """Write every profile and the machine into a folder, each atomically."""
@@ -75,7 +74,7 @@ class ProfileLibrary(Mapping[str, Profile]):
                 f"{root}: no such folder; anytime profile … --library {root} makes it"
             )
         for path in sorted(root.glob("*.profile")):
-            profile = _restore(path)
+            profile = read_profile(path)
             self._profiles[profile.module] = profile
         if (root / "machine.json").exists():
             self.machine = read_machine(root / "machine.json")
@@ -156,7 +155,8 @@ def _store(profile: Profile) -> _Profile:
     )
 
 
-def _restore(path: Path) -> Profile:
+def read_profile(path: Path) -> Profile:
+    """Read one profile. Raises AnytimeError for a broken file."""
     stored = read_record(path, PROFILE, _Profile)
     runs = tuple(_restored_run(path, index, run, stored) for index, run in enumerate(stored.runs))
     try:

@@ -82,10 +82,28 @@ def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
 
     Raises AnytimeError for a broken file, for a module that is missing or has other parameters.
     """
-    from compiler.compiled import CompiledProgram, Interval
+    file = Path(path)
+    return _restore(file, read_record(file, SCHEMA, _Schedule), modules)
 
+
+def inspect(path: str | Path) -> CompiledProgram:
+    """Read a compiled program to look at: its calls are bound to modules that cannot run."""
     file = Path(path)
     stored = read_record(file, SCHEMA, _Schedule)
+    modules = {
+        call.module: Module(call.module, _cannot_run, tuple(call.parameters))
+        for call in stored.calls
+    }
+    return _restore(file, stored, list(modules.values()))
+
+
+def _cannot_run(*inputs: object) -> None:
+    raise AnytimeError("this program was read to be looked at; compiler.load(…, modules=[…]) runs it")
+
+
+def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> CompiledProgram:
+    from compiler.compiled import CompiledProgram, Interval
+
     program = _bind(file, stored, {module.name: module for module in modules})
     made = tuple(_restore_table(file, table) for table in stored.tables)
     _check(file, stored, made)

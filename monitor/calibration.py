@@ -29,8 +29,9 @@ def measure_rhythm(
     *,
     seeds: Sequence[int],
     levels: int = 6,
-) -> Rhythm:
-    """The rhythm of a mission, from missions lived at constant sensing times.
+) -> Rhythm | None:
+    """The rhythm of a mission, from missions lived at constant sensing times; None if none of
+    them reached its goal.
 
     levels: sensing times, spread over those of the contracts. Each is lived once for each seed.
     """
@@ -48,8 +49,9 @@ def measure_rhythm(
             robot = make_robot()
             route = robot.situation().to_go
             report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
-            lived.append(_lived(float(time), route, report))
-    return rhythm_of(lived)
+            if report and route > 0:
+                lived.append(_lived(float(time), route, report))
+    return rhythm_of(lived) if lived else None
 
 
 def calibrate(

@@ -1,0 +1,57 @@
+"""The command `anytime`: walks the sub-commands that packages declare."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from importlib.metadata import entry_points
+
+from anytime.command_line import Parser, as_json
+from anytime.errors import AnytimeError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Exit codes: 0 done, 1 the mission was not reached or a goal was missed, 2 bad input, 130
+    interrupted, 70 a bug of ours (with the path of a report).
+    """
+    parser = Parser(prog="anytime", description="Anytime computation for robots.")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for point in sorted(entry_points(group="anytime.commands"), key=lambda point: point.name):
+        try:
+            point.load().declare(commands)
+        except Exception as error:  # a third party's broken command must not break ours
+            print(f"anytime: commands of {point.name!r} are left out: {error}", file=sys.stderr)
+    options = parser.parse_args(arguments)
+    try:
+        answer = options.run(options)
+        print(as_json(answer.data) if options.json else answer.text, flush=True)
+    except AnytimeError as error:
+        print(f"anytime: {error}".replace("\n", " "), file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        print("anytime: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        print(f"anytime: a bug of ours, {error!r}; report: {_report()}", file=sys.stderr)
+        return 70
+    return answer.code
+
+
+def _report() -> str:
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="anytime-crash-", suffix=".txt", delete=False
+    ) as file:
+        traceback.print_exc(file=file)
+    return file.name
+
+
+if __name__ == "__main__":
+    sys.exit(main())

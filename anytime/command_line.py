@@ -1,0 +1,126 @@
+"""The command line: what every command shares."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib.util
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, NoReturn
+
+from anytime.errors import AnytimeError
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command has to say: text for people, data for `--json`, and its exit code."""
+
+    text: str
+    data: Mapping[str, Any] = field(default_factory=dict)
+    code: int = 0
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose complaint is one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def add_command(
+    commands: Any, name: str, run: Callable[[argparse.Namespace], Answer], summary: str
+) -> argparse.ArgumentParser:
+    """Declare a sub-command that prints figures: it gets `--json`."""
+    parser = commands.add_parser(name, help=summary, description=summary)
+    parser.add_argument("--json", action="store_true", help="print one JSON object instead")
+    parser.set_defaults(run=run)
+    return parser
+
+
+def as_json(data: Mapping[str, Any]) -> str:
+    """One JSON object; a number that is not finite becomes null."""
+    return json.dumps(_finite(data), sort_keys=True, ensure_ascii=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, bool | str | int | None):
+        return value
+    if isinstance(value, float) or hasattr(value, "__float__"):
+        number = float(value)
+        return number if math.isfinite(number) else None
+    return str(value)
+
+
+def positive(text: str) -> float:
+    """A finite number > 0, as an argument."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number > 0")
+    return number
+
+
+def resolve(reference: str) -> Any:
+    """What a user means by a registered name or by FILE.py:NAME.
+
+    Files that the user types are imported; names found in data never are. Raises AnytimeError
+    that lists the registered names.
+    """
+    if ".py:" in reference:
+        file, _, name = reference.rpartition(":")
+        return _from_file(Path(file), name)
+    registered = {point.name: point for point in entry_points(group="anytime.modules")}
+    if reference not in registered:
+        raise AnytimeError(
+            f"{reference!r} is not registered (known: {', '.join(sorted(registered)) or 'none'}); "
+            "give one of these or FILE.py:NAME"
+        )
+    return registered[reference].load()
+
+
+def _from_file(file: Path, name: str) -> Any:
+    if not file.is_file():
+        raise AnytimeError(f"{file}: no such file; give FILE.py:NAME")
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None:
+        raise AnytimeError(f"{file} is not a Python file; give FILE.py:NAME")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules.setdefault(file.stem, module)
+    sys.path.insert(0, str(file.resolve().parent))
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.pop(0)
+    if not hasattr(module, name):
+        names = ", ".join(key for key in vars(module) if not key.startswith("_"))
+        raise AnytimeError(f"{file} has no {name!r}; it has {names}"[:300])
+    return getattr(module, name)
+
+
+@contextlib.contextmanager
+def progress(task: str) -> Iterator[Progress]:
+    """A progress bar on a terminal, silence elsewhere; yields a callback of (done, total)."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        bar = bars.add_task(task, total=None)
+        yield lambda done, total: bars.update(bar, completed=done, total=total)

@@ -1,0 +1,65 @@
+"""Commands of the compiler: compile, explain, advise."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from anytime.command_line import Answer, add_command, positive, resolve
+from anytime.errors import AnytimeError
+
+
+def declare(commands: Any) -> None:
+    """Declare the sub-commands."""
+    parser = add_command(commands, "compile", compile_program, "divide time among a program's modules")
+    parser.add_argument("program", help="a registered name or FILE.py:NAME")
+    parser.add_argument("--library", type=Path, default=Path("profiles"), metavar="DIR")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default NAME.schedule")
+    for name, run, summary in (
+        ("explain", explain, "who gets how much of a budget, and why"),
+        ("advise", advise, "which module is worth speeding up"),
+    ):
+        parser = add_command(commands, name, run, summary)
+        parser.add_argument("file", type=Path)
+        parser.add_argument("--seconds", type=positive, required=True)
+
+
+def compile_program(options: argparse.Namespace) -> Answer:
+    """Compile a program with the profiles of a library and write the result."""
+    from anytime import Module, ProfileLibrary
+    from anytime.programs import Program
+    from compiler.compiling import compile
+
+    program = resolve(options.program)
+    if not isinstance(program, Module | Program):
+        raise AnytimeError(f"{options.program} is {type(program).__name__}, not a program")
+    compiled = compile(program, ProfileLibrary(options.library))
+    target: Path = options.output or Path(f"{compiled.name}.schedule")
+    compiled.save(target)
+    return Answer(f"{compiled!r}\nwritten to {target}", {"file": str(target), "least": compiled.least})
+
+
+def explain(options: argparse.Namespace) -> Answer:
+    """Print the division of a budget and the price of a little more time for each call."""
+    from compiler.loading import inspect
+
+    found = inspect(options.file).explain(options.seconds)
+    data = {
+        "seconds": found.seconds,
+        "promised": found.promised,
+        "shares": {price.label: price.share for price in found.prices},
+        "prices": {price.label: price.gain for price in found.prices},
+    }
+    return Answer(repr(found), data)
+
+
+def advise(options: argparse.Namespace) -> Answer:
+    """Print what each module made twice as fast would be worth."""
+    from compiler.loading import inspect
+
+    found = inspect(options.file).advise(options.seconds)
+    return Answer(
+        repr(found),
+        {"promised": found.promised, "gains": {c.label: c.gain for c in found.changes}},
+    )

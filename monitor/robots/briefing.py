@@ -1,0 +1,129 @@
+"""The briefing before a mission: what the monitor is to know, and the policies to choose from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from anytime import ProfileLibrary, WorkClock
+from anytime.clocks import Clock
+from anytime.errors import AnytimeError
+from compiler import CompiledProgram, compile
+from monitor.calibration import calibrate, measure_rhythm
+from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
+from monitor.monitoring import Listener, Monitor
+from monitor.policies import Paper, Policy, constant
+from monitor.reports import Report
+from monitor.rhythms import Rhythm
+from monitor.robots.grid import GridRobot
+from monitor.robots.grid_missions import GridMission
+from monitor.robots.navigation import navigate
+
+POLICIES = ("expected", "paper", "fixed", "min", "max")
+# Missions of calibration have seeds of their own, far from those that anybody runs.
+RHYTHM_SEED, CALIBRATION_SEED = 1_000_000, 2_000_000
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How many missions are lived for calibration: levels of sensing × seeds, then seeds."""
+
+    levels: int = 6
+    rhythm_seeds: int = 8
+    seeds: int = 16
+    rounds: int = 2
+
+
+QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, rounds=1)
+
+
+@dataclass(frozen=True)
+class Briefing:
+    """A grid mission with its compiled program and the rhythm that it was measured to have."""
+
+    grid: GridMission
+    program: CompiledProgram
+    rhythm: Rhythm
+    effort: Effort
+
+    def robot(self, clock: Clock | None = None) -> GridRobot:
+        """The robot at the start of the mission."""
+        clock = clock or WorkClock(self.grid.machine)
+        return GridRobot(self.grid.scene, self.grid.mission.energy, clock)
+
+    @cached_property
+    def contracts(self) -> Contracts:
+        return compiled_contracts(self.program)
+
+    def monitor(self, policy: str) -> Monitor:
+        """The monitor with one of `POLICIES`. Raises AnytimeError for another name."""
+        return Monitor(self.program, self._policy(policy), policy, self.rhythm)
+
+    def _policy(self, name: str) -> Policy:
+        mission = self.grid.mission
+        if name == "paper":
+            return Paper(mission, self.contracts, self.rhythm)
+        if name == "fixed":
+            missing = {*self.program.labels, "speed"} - set(mission.fixed)
+            if missing:
+                raise AnytimeError(
+                    f"mission {mission.name!r} has no [fixed] {', '.join(sorted(missing))}; the "
+                    "policy fixed needs seconds for each call and a speed"
+                )
+            shares = {label: float(mission.fixed[label]) for label in self.program.labels}
+            return constant(shares, float(mission.fixed["speed"]))
+        if name in ("min", "max"):
+            return self._calibrated(pinned_contracts(self.program, name))
+        if name == "expected":
+            return self._calibrated(self.contracts)
+        raise AnytimeError(f"no policy {name!r}; there are {', '.join(POLICIES)}")
+
+    def _calibrated(self, contracts: Contracts) -> Policy:
+        seeds = range(CALIBRATION_SEED, CALIBRATION_SEED + self.effort.seeds)
+        return calibrate(
+            self.program,
+            self.grid.mission,
+            contracts,
+            self.rhythm,
+            self.robot,
+            seeds=seeds,
+            rounds=self.effort.rounds,
+        )
+
+    def live(
+        self,
+        monitor: Monitor,
+        seed: int,
+        *,
+        clock: Clock | None = None,
+        listen: Listener | None = None,
+    ) -> Report:
+        """Live the mission once."""
+        return monitor.run(self.grid.mission, self.robot(clock), seed=seed, listen=listen)
+
+
+def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort()) -> Briefing:  # noqa: B008
+    """Compile the paper's program for a mission's machine and measure the mission's rhythm."""
+    program = compile(navigate, library.on(grid.machine))
+    unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
+    briefing = Briefing(grid, program, unknown, effort)
+    seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)
+    rhythm = measure_rhythm(
+        program,
+        grid.mission,
+        briefing.contracts,
+        briefing.robot,
+        seeds=seeds,
+        levels=effort.levels,
+    )
+    return Briefing(grid, program, rhythm or unknown, effort)
+
+
+def _neutral(frame: float) -> Sequence[float]:
+    """A rhythm for missions of which nothing is known: no detours, no stops."""
+    return (0.0, 1.0 / frame, frame, 1.0, 0.0, 1.0)
+
+

@@ -1,0 +1,171 @@
+"""Missions of the grid robot as TOML files."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from anytime.errors import AnytimeError
+from anytime.machines import Machine
+from monitor.missions import Energy, Mission, Value
+from monitor.robots.grid import Scene
+from planners.path_finding import Cell
+from sensing import corner_to_corner, read_map
+from sensing.camera import Camera
+from sensing.vision import Device, Vision
+
+
+@dataclass(frozen=True)
+class GridMission:
+    """A mission, the floor it takes place on, and the machine that thinks for the robot."""
+
+    mission: Mission
+    scene: Scene
+    machine: Machine
+
+
+class _Section(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """A table of the file; keys that it does not have are refused."""
+
+
+class _Mission(_Section):
+    name: str = "mission"
+    job: float = 0.0
+    gain: float = 1.0
+    speeds: tuple[float, float] = (1.0, 10.0)
+
+
+class _Value(_Section):
+    kind: str
+    worth: float
+    seconds: float
+
+
+class _Energy(_Section):
+    price: float
+    base: float
+    square: float
+    idle: float = 0.0
+
+
+class _World(_Section):
+    map: str
+    start: tuple[int, int] | None = None
+    goal: tuple[int, int] | None = None
+    radius: int = 32
+    frame: float = 16.0
+    density: float = 0.2
+
+
+class _Vision(_Section):
+    kind: str = "parametric"
+    t_a: float = 2.0
+    t_b: float = 24.0
+    q_a: float = 0.75
+    q_b: float = 1.0
+    concave: bool = True
+    falloff: float = 0.0
+    exposures: int = 24
+
+
+class _File(_Section):
+    mission: _Mission
+    value: _Value
+    energy: _Energy
+    world: _World
+    vision: _Vision = msgspec.field(default_factory=_Vision)
+    machine: dict[str, float] = msgspec.field(default_factory=dict)
+    fixed: dict[str, float] = msgspec.field(default_factory=dict)
+
+
+REFERENCE = Machine("reference").with_rate("see", 0.25).with_rate("find_path", 0.001)
+"""Slow enough that thinking costs about as much as walking, so that the division matters."""
+
+
+def read_mission(
+    path: Path,
+    *,
+    map_path: Path | None = None,
+    start: Cell | None = None,
+    goal: Cell | None = None,
+) -> GridMission:
+    """Read a mission; map_path, start and goal replace those of the file.
+
+    The map's path is relative to the mission's file. Raises AnytimeError, in one line with the
+    path, for whatever is wrong.
+    """
+    file = _parse(path)
+    floor = read_map(map_path or path.parent / file.world.map)
+    replaced = map_path is not None
+    begin = start or (None if replaced else file.world.start)
+    end = goal or (None if replaced else file.world.goal)
+    if begin is None or end is None:
+        corners = corner_to_corner(_largest_component(floor.free))
+        begin, end = begin or corners[0], end or corners[1]
+    try:
+        scene = Scene(
+            free=floor.free,
+            start=begin,
+            goal=end,
+            radius=file.world.radius,
+            frame=file.world.frame,
+            device=_device(file.vision),
+            density=file.world.density,
+            name=floor.name,
+        )
+        mission = Mission(
+            value=Value(file.value.kind, file.value.worth, file.value.seconds),  # pyright: ignore[reportArgumentType]
+            energy=Energy(
+                file.energy.price, file.energy.base, file.energy.square, file.energy.idle
+            ),
+            speeds=file.mission.speeds,
+            job=file.mission.job,
+            gain=file.mission.gain,
+            name=file.mission.name if not replaced else f"{file.mission.name} on {floor.name}",
+            fixed=file.fixed,
+        )
+        machine = REFERENCE
+        for module, rate in file.machine.items():
+            machine = machine.with_rate(module, rate)
+    except AnytimeError as error:
+        raise AnytimeError(f"{path}: {error}") from None
+    return GridMission(mission, scene, machine)
+
+
+def _parse(path: Path) -> _File:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise AnytimeError(f"{path}: no such mission file") from None
+    except IsADirectoryError:
+        raise AnytimeError(f"{path} is a folder; give a mission file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AnytimeError(f"{path}: not TOML: {error}") from None
+    try:
+        return msgspec.convert(content, _File)
+    except msgspec.ValidationError as error:
+        raise AnytimeError(f"{path}: {error}") from None
+
+
+def _device(vision: _Vision) -> Device:
+    if vision.kind == "parametric":
+        return Vision(
+            vision.t_a, vision.t_b, vision.q_a, vision.q_b, vision.concave, vision.falloff
+        )
+    if vision.kind == "camera":
+        return replace(Camera(), last=vision.exposures)
+    raise AnytimeError(f"vision.kind is {vision.kind!r}; it must be parametric or camera")
+
+
+def _largest_component(free: np.ndarray) -> np.ndarray:
+    """The free cells of the largest connected part of a floor."""
+    from scipy.ndimage import label
+
+    parts, count = label(free)
+    if not count:
+        raise AnytimeError("the map has no free cell")
+    return parts == 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
