@@ -34,8 +34,9 @@ HIGHEST_LEVEL = 3
 
 # Fewer abstract positions than this between start and goal are no plan: begin a level lower.
 _FEWEST_POSITIONS = 4
-# Expansions between two yields, so that steps cost about the same and Python's share stays small.
-_GRAIN = 16
+# Expansions between two steps: as many as half the cells from start to goal and at least these, so
+# that a short plan has several steps and Python's share of a long one stays small.
+_LEAST_GRAIN = 16
 # A streamed cell is worth 1/256 of an expansion, in all places where work is counted.
 _STREAMED_PER_EXPANSION = 256
 # How much longer than planned a robot walks that bumps its way through obstacleness p: fitted to
@@ -59,14 +60,14 @@ def steps(
     goal: Cell,
     *,
     highest_level: int | None = None,
-    grain: int = _GRAIN,
+    grain: int | None = None,
 ) -> Iterator[Step]:
     """Plan from start to goal, abstractly at first, then in ever more detail.
 
     `domain` is float32 [rows, columns], the probability that a cell is blocked. A cell that is
     blocked for certain (1.0) is impassable, a believed obstacle only dear. The first step brings a
     plan at `highest_level` (chosen by distance, at most 3, if None), later ones refine its worst
-    segment, at least `grain` expansions a step. A step without a plan found none better. The last
+    segment, at least `grain` expansions a step (by distance, if None). A step without a plan found none better. The last
     one brings the plan that is refined as far as it can be. Work is counted in node expansions,
     with 1/256 for every cell summed.
 
@@ -82,7 +83,9 @@ def steps(
             raise AnytimeError(
                 f"{name} cell ({cell[0]}, {cell[1]}) is blocked for certain, choose a free cell"
             )
-    level = _level(domain.shape, start, goal) if highest_level is None else highest_level
+    distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
+    level = _level(distance) if highest_level is None else highest_level
+    grain = max(_LEAST_GRAIN, distance // 2) if grain is None else grain
     if not 0 <= level <= 15:
         raise AnytimeError(f"highest_level is {level}, it must be between 0 and 15")
     pyramid, streamed = _pyramid(domain, level)
@@ -111,8 +114,7 @@ def find_path(domain, start, goal):
         yield step.plan
 
 
-def _level(shape: tuple[int, ...], start: Cell, goal: Cell) -> int:
-    distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
+def _level(distance: int) -> int:
     level = HIGHEST_LEVEL
     while level > 0 and distance >> level < _FEWEST_POSITIONS:
         level -= 1
