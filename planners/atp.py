@@ -67,12 +67,13 @@ def steps(
     `domain` is float32 [rows, columns], the probability that a cell is blocked. A cell that is
     blocked for certain (1.0) is impassable, a believed obstacle only dear. The first step brings a
     plan at `highest_level` (chosen by distance, at most 3, if None), later ones refine its worst
-    segment, at least `grain` expansions a step (by distance, if None). A step without a plan found none better. The last
-    one brings the plan that is refined as far as it can be. Work is counted in node expansions,
-    with 1/256 for every cell summed.
+    segment, at least `grain` expansions a step (by distance, if None). A step without a plan found
+    none better. The last one brings the plan that is refined as far as it can be. Work is counted
+    in node expansions, with 1/256 for every cell summed.
 
     Raises AnytimeError if start or goal is outside the domain or certainly blocked. If no way leads
-    to the goal the abstract plan says nothing of it: the robot that follows it finds out.
+    to the goal an abstract plan says nothing of it: the robot that follows it finds out. A plan
+    without any cell, of infinite length, says that the base level has no way.
     """
     domain = np.ascontiguousarray(domain, np.float32)
     if domain.ndim != 2 or not domain.size:
@@ -91,13 +92,14 @@ def steps(
     pyramid, streamed = _pyramid(domain, level)
     if streamed < 0:
         raise AnytimeError("the domain holds a number outside [0, 1], they must be probabilities")
-    work, straight = workspace(domain.size), _straight(start, goal)
-    state, expansions = first_plan(pyramid, level, first, last, work)
+    straight = _straight(start, goal)
+    state, expansions = first_plan(pyramid, level, first, last, workspace(domain.size))
     best = _multipath(state, pyramid, straight)
     yield Step(float(expansions + streamed / _STREAMED_PER_EXPANSION), best)
     done = False
     while not done:
-        state, expansions, done = refine(state, pyramid, grain, work)
+        # A generator may be resumed by another thread, which has a workspace of its own.
+        state, expansions, done = refine(state, pyramid, grain, workspace(domain.size))
         plan = _multipath(state, pyramid, straight)
         # A base level plan's length is known, an abstract one's only believed.
         better = plan.length < best.length or (done and plan.level == 0 < best.level)
@@ -128,7 +130,8 @@ def _straight(start: Cell, goal: Cell) -> float:
 
 def _multipath(state, pyramid: Pyramid, straight: float) -> MultiPath:
     plan, bounds, blocked, length = _flatten(state, pyramid)
-    return MultiPath(plan, bounds, blocked, max(float(length), straight), straight)
+    believed = max(float(length), straight) if len(plan) else math.inf
+    return MultiPath(plan, bounds, blocked, believed, straight)
 
 
 def _costs() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

@@ -28,8 +28,8 @@ class MultiPath:
 
     `plan` is int32 [n, 3] of (level, row, column), all segments one after the other; `bounds` is
     int32 [m + 1], segment i is `plan[bounds[i]:bounds[i + 1]]`; `obstacleness` is float [m].
-    `length` is what the planner believes that will be walked, in cells, and `straight` the least
-    that it can be (octile distance).
+    `length` is what the planner believes that will be walked, in cells (infinite where it knows of
+    no way), and `straight` the least that it can be (octile distance).
     """
 
     plan: NDArray[np.int32]

@@ -53,7 +53,8 @@ def test_every_plan_is_executable_and_none_is_believed_longer_than_the_last(prob
     # Only a plan without abstraction may be believed longer: of that one the length is known.
     assert len(plans) == 1 or lengths[-1] <= lengths[-2] or plans[-1].level == 0
     for plan in plans:
-        assert 0.0 < plan.estimate <= 1.0
+        assert 0.0 <= plan.estimate <= 1.0
+        assert (plan.estimate > 0.0) == (len(plan.plan) > 0) or start == goal
         assert sum(len(piece.cells) for piece in plan.segments) == len(plan.plan)
         assert all(0.0 <= piece.obstacleness <= 1.0 for piece in plan.segments)
     for plan in (plans[0], plans[len(plans) // 2], plans[-1]):
@@ -107,11 +108,25 @@ def test_as_an_anytime_module_it_counts_its_own_work():
 def test_believed_obstacles_are_dear_and_certain_ones_impassable():
     domain = np.zeros((9, 9), np.float32)
     domain[:, 4] = 0.95
-    crossing = [step.plan for step in steps(domain, (4, 0), (4, 8), highest_level=0)][-1]
+    crossing = next(steps(domain, (4, 0), (4, 8), highest_level=0)).plan
     assert crossing.level == 0
     assert len(crossing.plan) > 0
     domain[:, 4] = 1.0
-    assert len([step.plan for step in steps(domain, (4, 0), (4, 8), highest_level=0)][-1].plan) == 0
+    nothing = next(steps(domain, (4, 0), (4, 8), highest_level=0)).plan
+    assert len(nothing.plan) == 0
+    assert (nothing.length, nothing.estimate) == (float("inf"), 0.0)
+
+
+def test_a_search_between_two_steps_changes_nothing():
+    free, start, goal = instance("r20", 64, 2)
+    domain = (~free).astype(np.float32)
+    alone = [step.plan.plan.tobytes() for step in steps(domain, start, goal) if step.plan]
+    beside = []
+    for step in steps(domain, start, goal):
+        astar(np.ones((90, 90), bool), (0, 0), (89, 40))
+        if step.plan:
+            beside.append(step.plan.plan.tobytes())
+    assert alone == beside
 
 
 def test_mistakes_are_named():
