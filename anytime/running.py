@@ -235,6 +235,7 @@ def run(
     deadline: Deadline | None = None,
     rng: np.random.Generator | None = None,
     memory: dict[str, Any] | None = None,
+    on_result: Callable[[Any, Change], None] | None = None,
 ) -> Result:
     """Run a module until it completes or its time is up, and return the last result.
 
@@ -252,7 +253,7 @@ def run(
         deadline = Deadline.after(seconds or 0.0, clock)
     if outer is not None and outer.deadline.clock is deadline.clock:
         deadline = Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
-    return execute(module, inputs, deadline, rng=rng, memory=memory)[0]
+    return execute(module, inputs, deadline, rng=rng, memory=memory, observe=on_result)[0]
 
 
 def call_inside(module: Module, inputs: tuple[object, ...]) -> Any:

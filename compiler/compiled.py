@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +17,14 @@ from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile, Recording
 from anytime.programs import Call, Input, Program
-from anytime.running import Result, Run, Status, execute
+from anytime.running import Change, Result, Run, Status, execute
 from compiler import baselines
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.explaining import Advice, Explanation, advise, explain
 from compiler.guarding import Steps, guard
 from compiler.tables import Table
 
+Listener = Callable[[str, Any, Change], None]
 QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
 
 
@@ -159,11 +160,13 @@ class CompiledProgram:
         deadline: Deadline | None = None,
         clock: Clock | None = None,
         rng: np.random.Generator | None = None,
+        on_result: Listener | None = None,
         **inputs: Any,
     ) -> Result:
         """Run the program for a budget: each call gets its share, unspent time passes on.
 
         seconds or deadline: the budget; clock: whose time it is (real time by default).
+        on_result: called with (label, value, change) whenever a call registers a result.
         inputs: by name. Below the least budget nothing is run and there is no result.
         Raises AnytimeError for missing or unknown inputs.
         """
@@ -178,7 +181,8 @@ class CompiledProgram:
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
         allocation = self.allocate(budget)
         started = deadline.clock.now()
-        parts = dict(self.stages(allocation.shares, deadline, inputs, rng=rng))
+        stages = self.stages(allocation.shares, deadline, inputs, rng=rng, on_result=on_result)
+        parts = dict(stages)
         return self._composed(allocation, deadline, started, parts)
 
     def stages(
@@ -189,6 +193,7 @@ class CompiledProgram:
         *,
         rng: np.random.Generator | None = None,
         interrupted: Callable[[], bool] = lambda: False,
+        on_result: Listener | None = None,
     ) -> Iterator[tuple[str, Result]]:
         """Run call after call and yield (label, result); the end of one without a result.
 
@@ -215,6 +220,7 @@ class CompiledProgram:
                 own,
                 rng=rng,
                 may_step=lambda run, may=may_step: not interrupted() and may(run),
+                observe=None if on_result is None else partial(on_result, call.label),
             )
             yield call.label, parts[call.label]
             if not parts[call.label] or interrupted():

@@ -49,9 +49,9 @@ class Frontier:
 def divide(tables: Sequence[Table]) -> Frontier:
     """The frontier of a program's divisions of time. [ZR93] §4, in the inverse domain.
 
-    Over distributions and exact on the tables' moments for one and two calls. Beyond, pairs of
-    calls exchange their time optimally while the others keep theirs, starting from the (min, +)
-    solution for mean qualities.
+    Over distributions and exact on the tables' moments for one and two calls, and for any number
+    where nothing is left to chance. Beyond, pairs of calls exchange their time optimally while
+    the others keep theirs, starting from the (min, +) solution for mean qualities.
     """
     if len(tables) == 1:
         values = tables[0].expected
@@ -61,6 +61,8 @@ def divide(tables: Sequence[Table]) -> Frontier:
     if len(tables) == 2:
         return _frontier(tables, *_pair(tables, (0, 0), 0, 1))
     totals, moments, values = _from_mean_levels(tables)
+    if all(_certain(table) for table in tables):
+        return _frontier(tables, totals, moments, values)
     least = float(totals[values > 0].min(initial=np.inf))
     most = float(sum(table.times[-1] for table in tables))
     if np.isfinite(least):
@@ -173,6 +175,11 @@ def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp]
     totals = np.array([sum(t.times[m] for t, m in zip(tables, row, strict=True)) for row in found])
     values = np.array([expected_quality(tables, row) for row in found])
     return totals, moments, values
+
+
+def _certain(table: Table) -> bool:
+    """Whether each input and time leads to one level for sure."""
+    return bool(((table.chances == 0) | (table.chances == 1)).all())
 
 
 def _undominated(

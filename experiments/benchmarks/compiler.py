@@ -1,0 +1,176 @@
+"""The compiler against brute force, and above MIN and MAX. [ZR93] Fig. 8."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from anytime import Deadline, WorkClock
+from anytime import measure as measure_profiles
+from compiler import CompiledProgram, compile
+from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
+from compiler.division import divide
+from compiler.tables import Table
+from experiments.benchmarks.figures import Benchmark
+from experiments.domains import MACHINE, Domain, cross, domain
+
+FAMILY, SIZE = "r20", 128
+UNSEEN = 100  # problems that the profiles never saw
+
+
+def measure(
+    *,
+    quick: bool = False,
+    full: bool = False,
+    seed: int = 0,
+    maps: Path | None = None,
+    progress: Callable[[str], None] = lambda message: None,
+) -> Benchmark:
+    """Fig. 8 on measured profiles and on unseen problems; trees and DAGs against brute force."""
+    problems = 200 if quick else 300
+    progress(f"measuring on {problems} domains")
+    library = measure_profiles(
+        cross,
+        [domain(FAMILY, SIZE, index, seed) for index in range(problems)],
+        seconds=3.0,
+        clock=lambda: WorkClock(MACHINE),
+        seed=seed,
+    )
+    compiled = compile(cross, library)
+    budgets = np.linspace(compiled.least, float(compiled.frontier.budgets[-1]), 400)
+    promised = np.array([compiled.promise(t) for t in budgets])
+    better = np.maximum(minimal(compiled.tables, budgets), maximal(compiled.tables, budgets))
+    figures: dict[str, float | int | None] = {
+        "fig8.below_min_max": int((promised < better - 1e-4).sum()),
+        "fig8.gain": float((promised - better).max()),
+        "fig8.gain_at_s": float(budgets[int((promised - better).argmax())]),
+    }
+    progress(f"running on {UNSEEN} domains never seen")
+    unseen = [domain(FAMILY, SIZE, index, seed + 1) for index in range(UNSEEN)]
+    figures |= _unseen(compiled, unseen, count=8 if quick else 16)
+    trees, dags = (200, 100) if quick else (2000, 1000)
+    progress(f"{trees} trees and {dags} DAGs against brute force")
+    rng = np.random.default_rng(seed)
+    figures["tree.mismatches"] = sum(_mismatch(random_program(rng, False)) for _ in range(trees))
+    figures["tree.count"] = trees
+    figures["dag.mismatches"] = sum(_mismatch(random_program(rng, True)) for _ in range(dags))
+    figures["dag.count"] = dags
+    settings = {"family": FAMILY, "size": SIZE, "problems": problems, "unseen": UNSEEN}
+    return Benchmark("compiler", figures, settings, seed)
+
+
+def _unseen(
+    compiled: CompiledProgram, problems: Sequence[Domain], count: int
+) -> dict[str, float | int | None]:
+    """Budgets at which running the program is worse than MIN or MAX by more than the standard
+    error of its mean; and, sharper, by more than that of the paired difference."""
+    ends = compiled.least, float(compiled.frontier.budgets[-1])
+    below, below_paired, gains = 0, 0, []
+    for budget in np.geomspace(*ends, count):
+        achieved = _achieved(compiled, problems, float(budget), None)
+        for shares_of in (minimal_shares, maximal_shares):
+            shares = shares_of(compiled.tables, float(budget))
+            rival = _achieved(compiled, problems, float(budget), shares)
+            difference = achieved - rival
+            error = achieved.std(ddof=1) / np.sqrt(len(problems))
+            paired = difference.std(ddof=1) / np.sqrt(len(problems))
+            below += bool(difference.mean() < -error - 1e-9)
+            below_paired += bool(difference.mean() < -paired - 1e-9)
+            gains.append(float(difference.mean()))
+    return {
+        "fig8.unseen_below": below,
+        "fig8.unseen_below_paired": below_paired,
+        "fig8.unseen_gain": max(gains),
+        "fig8.unseen_budgets": count,
+    }
+
+
+def _achieved(
+    compiled: CompiledProgram,
+    problems: Sequence[Domain],
+    budget: float,
+    shares: Sequence[float] | None,
+) -> np.ndarray:
+    """True quality of what was there at the deadline, by the compiled division or given shares;
+    0 where there was nothing."""
+    output = compiled.labels[-1]
+    qualities = np.zeros(len(problems))
+    if shares is not None and min(shares) < 0:
+        return qualities
+    for index, problem in enumerate(problems):
+        inputs = {"sensor": problem.sensor, "start": problem.start, "goal": problem.goal}
+        clock = WorkClock(MACHINE)
+        deadline = Deadline.after(budget, clock)
+        in_time: list[object] = []
+
+        def keep(label: str, value: object, change: object, kept=in_time, until=deadline) -> None:
+            if label == output and not until.remaining() < 0:
+                kept.append(value)
+
+        rng = np.random.default_rng([index])
+        if shares is None:
+            compiled.run(deadline=deadline, rng=rng, on_result=keep, **inputs)
+        else:
+            named = dict(zip(compiled.labels, shares, strict=True))
+            dict(compiled.stages(named, deadline, inputs, rng=rng, on_result=keep))
+        if in_time:
+            qualities[index] = compiled.program.output.module.score(in_time[-1], problem)
+    return qualities
+
+
+def random_program(rng: np.random.Generator, shared: bool) -> tuple[Table, ...]:
+    """Deterministic tables of a random program of 2 to 4 calls; half of them are not monotone in
+    their inputs. With `shared` a result may feed several calls."""
+    count = int(rng.integers(2, 5))
+    monotone = bool(rng.random() < 0.5)
+    feeds: list[list[int]] = [[] for _ in range(count)]
+    for place in range(count - 1):
+        users = rng.choice(np.arange(place + 1, count), size=1 + int(shared and rng.random() < 0.6))
+        for user in {int(user) for user in users}:
+            if len(feeds[user]) < 2:
+                feeds[user].append(place)
+        if not any(place in fed for fed in feeds):
+            feeds[count - 1].append(place)
+    tables: list[Table] = []
+    for place in range(count):
+        levels = int(rng.integers(3, 6))
+        times = np.concatenate([[0.0], np.cumsum(rng.integers(1, 4, size=int(rng.integers(2, 5))))])
+        shape = [len(tables[fed].levels) for fed in feeds[place]]
+        reached = rng.integers(0, levels, size=(*shape, len(times)))
+        reached[..., 0] = 0
+        if monotone:
+            for axis in range(reached.ndim):
+                reached = np.maximum.accumulate(reached, axis=axis)
+        for axis in range(len(shape)):
+            reached[(slice(None),) * axis + (0,)] = 0  # no input, no result
+        chances = (reached[..., None] == np.arange(levels)).astype(float)
+        qualities = np.concatenate([[0.0], np.sort(rng.random(levels - 1)).round(6)])
+        labels = tuple(f"call {fed}" for fed in feeds[place])
+        tables.append(
+            Table(f"call {place}", f"call {place}", labels, qualities, times, chances, float(times[1]))
+        )
+    return tuple(tables)
+
+
+def _mismatch(tables: Sequence[Table]) -> bool:
+    """Whether the compiled promise differs from the best of all divisions at any budget."""
+    best: dict[float, float] = {}
+    for moments in itertools.product(*(range(len(table.times)) for table in tables)):
+        level: dict[str, int] = {}
+        for table, moment in zip(tables, moments, strict=True):
+            fed = tuple(level[name] for name in table.feeds)
+            level[table.label] = int(table.chances[(*fed, moment)].argmax())
+        total = float(sum(t.times[m] for t, m in zip(tables, moments, strict=True)))
+        quality = float(tables[-1].levels[level[tables[-1].label]])
+        best[total] = max(best.get(total, 0.0), quality)
+    frontier = divide(tables)
+    reached = 0.0
+    for budget in sorted(best):
+        reached = max(reached, best[budget])
+        promised = frontier.promise(budget) if len(frontier.budgets) else 0.0
+        if abs(promised - reached) > 1e-9:
+            return True
+    return False
