@@ -25,6 +25,10 @@ from planners.search import (
     WALL,
 )
 
+# numba compiles a callee once more for every literal argument; these are no literals.
+YES, ZERO, CHEAPEST, EXACT = np.bool_(True), np.int64(0), np.int64(1), np.int64(100)
+IMPASSABLE, ENDLESS = np.int64(WALL), np.int64(UNLIMITED)
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def octile(rows, columns):
@@ -56,7 +60,7 @@ def _before(one, other, key, label):
 def _sift_up(place, node, heap, slot, key, label):
     """Move `node` up from `place`; `slot` is each node's place in the heap."""
     while place > 0:
-        parent = int(heap[(place - 1) >> 1])
+        parent = np.int64(heap[(place - 1) >> 1])
         if not _before(node, parent, key, label):
             break
         heap[place] = parent
@@ -69,13 +73,15 @@ def _sift_up(place, node, heap, slot, key, label):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _pop(size, heap, slot, key, label):
     """Take the first node from a heap of `size`; the heap then holds one less."""
-    first, node, place = int(heap[0]), int(heap[size - 1]), 0
+    first, node, place = np.int64(heap[0]), np.int64(heap[size - 1]), 0
     size -= 1
     while 2 * place + 1 < size:
         child = 2 * place + 1
-        if child + 1 < size and _before(int(heap[child + 1]), int(heap[child]), key, label):
+        if child + 1 < size and _before(
+            np.int64(heap[child + 1]), np.int64(heap[child]), key, label
+        ):
             child += 1
-        moved = int(heap[child])
+        moved = np.int64(heap[child])
         if not _before(moved, node, key, label):
             break
         heap[place] = moved
@@ -120,7 +126,7 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
     key[start] = 0
     heap[0] = start
     slot[start] = 0
-    size, expansions = 1, 0
+    size, expansions = np.int64(1), 0
     while size > 0:
         node = _pop(size, heap, slot, key, label)
         size -= 1
@@ -176,7 +182,7 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
             label[there] = base - g - step
             key[there] = g + step + h * percent // 100
             if known:
-                place = int(slot[there])
+                place = np.int64(slot[there])
             else:
                 place = size
                 size += 1
@@ -280,12 +286,12 @@ def _approach(cost, columns, node, target, is_goal, work):
         )
         whole = box[0] == 0 and box[1] == 0 and box[2] == rows and box[3] == columns
         found, taken = window_search(
-            cost, WALL, columns, node, target, box, True, 100, 1, UNLIMITED, work
+            cost, IMPASSABLE, columns, node, target, box, YES, EXACT, CHEAPEST, ENDLESS, work
         )
         expansions += taken
         last = whole or (not is_goal and margin >= ADVICE)
         if found >= 0:
-            path = path_to(cost, WALL, columns, node, found, True, work)
+            path = path_to(cost, IMPASSABLE, columns, node, found, YES, work)
             # What lies outside the window matters only to a long detour or a believed obstacle.
             if last or not _doubtful(cost, columns, path, ahead + 2 * margin * STRAIGHT):
                 return path, expansions
@@ -332,7 +338,7 @@ def walk(free, cost, touched, columns, plan, start, goal, limit, work):
             bottom, right = top + 1, left + 1
         down, across = top - node // columns, left - node % columns
         adjacent = bottom - top == 1 and right - left == 1 and abs(down) <= 1 and abs(across) <= 1
-        if adjacent and step_cost(cost, WALL, columns, node, down, across) > 0:
+        if adjacent and step_cost(cost, IMPASSABLE, columns, node, down, across) > 0:
             leg = np.empty(2, np.int32)
             leg[1] = top * columns + left
         else:
@@ -352,9 +358,9 @@ def walk(free, cost, touched, columns, plan, start, goal, limit, work):
             reopened = True
             continue
         for place in range(1, leg.size):
-            there = int(leg[place])
+            there = np.int64(leg[place])
             down, across = there // columns - node // columns, there % columns - node % columns
-            if step_cost(cost, WALL, columns, node, down, across) == 0:
+            if step_cost(cost, IMPASSABLE, columns, node, down, across) == 0:
                 break
             step = STRAIGHT if down == 0 or across == 0 else DIAGONAL
             if length + step > limit:
@@ -379,6 +385,7 @@ LEVEL, FIRST, COUNT, LEFT, RIGHT, NEXT, FINAL, OBSTACLENESS = range(8)
 SEGMENTS, JOINTS, CELLS, HEAD_SEGMENT = range(4)
 # Positions of a segment; full obstacleness of a cell; cost of an abstract free cell.
 POSITIONS = 12
+REACH = np.int64(POSITIONS)
 FULL = 4096
 ABSTRACT = 16
 # Abstract cells cost more than a free one nearly everywhere, and an abstract length is a belief:
@@ -420,14 +427,14 @@ def _with_room(rows, used):
 def _mean_obstacleness(pyramid, level, path):
     total, base = 0, pyramid.offset[level]
     for place in range(path.size):
-        total += int(pyramid.obstacleness[base + path[place]])
+        total += np.int64(pyramid.obstacleness[base + path[place]])
     return total // path.size
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_segment(plan, pyramid, level, path, left, right):
     """Append a segment (not yet linked); return (plan, its number)."""
-    number, used = int(plan.size[SEGMENTS]), int(plan.size[CELLS])
+    number, used = np.int64(plan.size[SEGMENTS]), np.int64(plan.size[CELLS])
     segment, cell = _with_room(plan.segment, number), plan.cell
     if used + path.size > cell.size:
         cell = np.zeros(2 * (used + path.size), np.int32)
@@ -449,7 +456,7 @@ def _add_segment(plan, pyramid, level, path, left, right):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_joint(plan, level, row, column):
     """Append a joint; return (plan, its number)."""
-    number = int(plan.size[JOINTS])
+    number = np.int64(plan.size[JOINTS])
     joint = _with_room(plan.joint, number)
     joint[number, 0] = level
     joint[number, 1] = row
@@ -461,8 +468,10 @@ def _add_joint(plan, level, row, column):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project(plan, number, level, columns):
     """Return the cell of a level that holds the joint, as a flat index."""
-    shift = level - int(plan.joint[number, 0])
-    return (int(plan.joint[number, 1]) >> shift) * columns + (int(plan.joint[number, 2]) >> shift)
+    shift = level - np.int64(plan.joint[number, 0])
+    return (np.int64(plan.joint[number, 1]) >> shift) * columns + (
+        np.int64(plan.joint[number, 2]) >> shift
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -477,23 +486,23 @@ def _descend(plan, pyramid, number, level, beside, beyond):
     rows = (pyramid.offset[level + 1] - base) // columns
     best, best_row, best_column = 1 << 60, 0, 0
     for child in range(4):
-        row = 2 * int(plan.joint[number, 1]) + (child >> 1)
-        column = 2 * int(plan.joint[number, 2]) + (child & 1)
+        row = 2 * np.int64(plan.joint[number, 1]) + (child >> 1)
+        column = 2 * np.int64(plan.joint[number, 2]) + (child & 1)
         if row >= rows or column >= columns:
             continue
         detour = 0
         for end in range(2):
             other = beside if end == 0 else beyond
             # In half cells of `level`, from centre to centre.
-            size = int(plan.joint[other, 0]) - level
+            size = np.int64(plan.joint[other, 0]) - level
             if size >= 0:
-                there_row = (2 * int(plan.joint[other, 1]) + 1) << size
-                there_column = (2 * int(plan.joint[other, 2]) + 1) << size
+                there_row = (2 * np.int64(plan.joint[other, 1]) + 1) << size
+                there_column = (2 * np.int64(plan.joint[other, 2]) + 1) << size
             else:
-                there_row = 2 * (int(plan.joint[other, 1]) >> -size) + 1
-                there_column = 2 * (int(plan.joint[other, 2]) >> -size) + 1
+                there_row = 2 * (np.int64(plan.joint[other, 1]) >> -size) + 1
+                there_column = 2 * (np.int64(plan.joint[other, 2]) >> -size) + 1
             detour += octile(2 * row + 1 - there_row, 2 * column + 1 - there_column)
-        blocked = int(pyramid.obstacleness[base + row * columns + column])
+        blocked = np.int64(pyramid.obstacleness[base + row * columns + column])
         worth = (blocked << 40) + detour
         if worth < best:
             best, best_row, best_column = worth, row, column
@@ -521,11 +530,11 @@ def _find(pyramid, level, start, goal, margin, work):
     if cost[start] == WALL or cost[goal] == WALL:
         return np.empty(0, np.int32), 0
     found, expansions = window_search(
-        cost, WALL, columns, start, target, box, True, percent, floor, UNLIMITED, work
+        cost, IMPASSABLE, columns, start, target, box, YES, percent, floor, ENDLESS, work
     )
     if found < 0:
         return np.empty(0, np.int32), expansions
-    return path_to(cost, WALL, columns, start, goal, True, work), expansions
+    return path_to(cost, IMPASSABLE, columns, start, goal, YES, work), expansions
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -538,10 +547,10 @@ def first_plan(pyramid, level, start, goal, work):
         np.zeros(1024, np.int32),
     )
     columns, base_columns = pyramid.columns[level], pyramid.columns[0]
-    plan, left = _add_joint(plan, 0, start // base_columns, start % base_columns)
-    plan, last = _add_joint(plan, 0, goal // base_columns, goal % base_columns)
+    plan, left = _add_joint(plan, ZERO, start // base_columns, start % base_columns)
+    plan, last = _add_joint(plan, ZERO, goal // base_columns, goal % base_columns)
     first, end = _project(plan, left, level, columns), _project(plan, last, level, columns)
-    path, expansions = _find(pyramid, level, first, end, 1 << 20, work)
+    path, expansions = _find(pyramid, level, first, end, ENDLESS >> 40, work)
     plan.size[HEAD_SEGMENT] = -1
     before, begin = -1, 0
     while begin < path.size:
@@ -566,13 +575,15 @@ def first_plan(pyramid, level, start, goal, work):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _worst(plan):
     """Return the segment most blocked, weighted by its size, or -1 where none is refinable."""
-    worst, most, number = -1, -1, int(plan.size[HEAD_SEGMENT])
+    worst, most, number = -1, -1, np.int64(plan.size[HEAD_SEGMENT])
     while number >= 0:
         if plan.segment[number, FINAL] == 0:
-            blocked = (1 + int(plan.segment[number, OBSTACLENESS])) << plan.segment[number, LEVEL]
+            blocked = (1 + np.int64(plan.segment[number, OBSTACLENESS])) << plan.segment[
+                number, LEVEL
+            ]
             if blocked > most:
                 worst, most = number, blocked
-        number = int(plan.segment[number, NEXT])
+        number = np.int64(plan.segment[number, NEXT])
     return worst
 
 
@@ -588,13 +599,13 @@ def refine(plan, pyramid, grain, work):
         worst = _worst(plan)
         if worst < 0:
             return plan, expansions, True
-        level, count = int(plan.segment[worst, LEVEL]), int(plan.segment[worst, COUNT])
-        first, after = int(plan.segment[worst, FIRST]), int(plan.segment[worst, NEXT])
-        left, right = int(plan.segment[worst, LEFT]), int(plan.segment[worst, RIGHT])
+        level, count = np.int64(plan.segment[worst, LEVEL]), np.int64(plan.segment[worst, COUNT])
+        first, after = np.int64(plan.segment[worst, FIRST]), np.int64(plan.segment[worst, NEXT])
+        left, right = np.int64(plan.segment[worst, LEFT]), np.int64(plan.segment[worst, RIGHT])
         halves, middle = 1, right
         if count > POSITIONS // 2 + 1:
             halves = 2
-            split, columns = int(plan.cell[first + count // 2]), pyramid.columns[level]
+            split, columns = np.int64(plan.cell[first + count // 2]), pyramid.columns[level]
             plan, middle = _add_joint(plan, level, split // columns, split % columns)
         _descend(plan, pyramid, left, level - 1, left, middle)
         _descend(plan, pyramid, right, level - 1, middle, right)
@@ -606,15 +617,15 @@ def refine(plan, pyramid, grain, work):
             _project(plan, middle, level - 1, columns),
             _project(plan, right, level - 1, columns),
         )
-        path, taken = _find(pyramid, level - 1, ends[0], ends[1], POSITIONS, work)
+        path, taken = _find(pyramid, level - 1, ends[0], ends[1], REACH, work)
         expansions += taken
         rest = path
         if halves == 2:
-            rest, taken = _find(pyramid, level - 1, ends[1], ends[2], POSITIONS, work)
+            rest, taken = _find(pyramid, level - 1, ends[1], ends[2], REACH, work)
             expansions += taken
         if path.size == 0 or rest.size == 0:
             # The joint between the halves may lie in a pocket, or the way round be long.
-            whole, taken = _find(pyramid, level - 1, ends[0], ends[2], RETRY * POSITIONS, work)
+            whole, taken = _find(pyramid, level - 1, ends[0], ends[2], RETRY * REACH, work)
             expansions += taken
             if whole.size > 0:
                 path, middle, halves = whole, right, 1
