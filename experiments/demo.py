@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,8 @@ import numpy as np
 from anytime import ProfileLibrary, WorkClock, measure
 from experiments.benchmarks.figures import Benchmark
 from experiments.comparing import margins
+from monitor.logs import read_log
+from monitor.page import write_page
 from monitor.reports import Report
 from monitor.robots.briefing import Briefing, brief
 from monitor.robots.grid_missions import GridMission
@@ -60,12 +63,17 @@ def _margin(rival: str, figures, key: str) -> str:  # noqa: ANN001
     return f"over {rival}: {figures[key]:+.1%} [{low:+.1%}, {high:+.1%}]"
 
 
-def measured(grid: GridMission, seed: int, tell: Callable[[int, int], None]) -> ProfileLibrary:
+def measured(
+    grid: GridMission,
+    seed: int,
+    tell: Callable[[int, int], None] | None = None,
+    problems: int = PROBLEMS,
+) -> ProfileLibrary:
     """Profiles of seeing and planning on a mission's own floor, in the machine's seconds."""
-    problems = list(frame_problems(grid.scene, np.random.default_rng(seed), PROBLEMS))
+    frames = list(frame_problems(grid.scene, np.random.default_rng(seed), problems))
     return measure(
         navigate,
-        problems,
+        frames,
         seconds=SECONDS,
         clock=lambda: WorkClock(grid.machine),
         seed=seed,
@@ -116,11 +124,13 @@ def _figures(
     return Benchmark("demo", figures, settings, seed)
 
 
-def page_logs(demo: Demo, seed: int, folder: Path) -> list[Path]:
-    """Logs of one seed lived under each policy, for the page."""
-    from monitor.robots.logging_missions import live_logged
-
-    return [
-        live_logged(demo.briefing, policy, seed, folder / f"{row}.jsonl")
-        for row, policy in ROWS.items()
-    ]
+def write_report(demo: Demo, folder: Path, seed: int) -> Path:
+    """Live one seed again under each policy, logged, and write `report.html` about it."""
+    logs = []
+    for row, policy in ROWS.items():
+        file = folder / "anytime-run" / f"{row}.jsonl"
+        demo.briefing.live(demo.briefing.monitor(policy), seed, log=file)
+        logs.append(read_log(file))
+    table = f"<pre>{html.escape(repr(demo))}</pre>"
+    title = f"{demo.briefing.grid.mission.name}, seed {seed}"
+    return write_page(logs, folder / "report.html", summary=table, title=title)

@@ -1,4 +1,7 @@
-"""What ships with the project: maps, missions and measured profiles."""
+"""What ships with the project: maps, missions and measured profiles.
+
+`python -m experiments.shipped` measures the profiles anew.
+"""
 
 from __future__ import annotations
 
@@ -18,3 +21,15 @@ def mission_path(name: str = "office") -> Path:
 def profiles() -> ProfileLibrary:
     """The shipped profiles of `see` and `find_path`, quality over units of work."""
     return ProfileLibrary(DATA / "profiles")
+
+
+def measure_profiles(runs: int = 60) -> ProfileLibrary:
+    """Measure the profiles that ship: seeing and planning in the office, on the work clock."""
+    from experiments.demo import measured
+    from monitor.robots.grid_missions import read_mission
+
+    return measured(read_mission(mission_path()), seed=1993, problems=runs)
+
+
+if __name__ == "__main__":
+    measure_profiles().save(DATA / "profiles")

@@ -57,3 +57,7 @@ class Robot(Protocol):
     def story(self) -> Mapping[str, Any]:
         """What to log of the frame that just ended, as plain data."""
         ...
+
+    def picture(self) -> Mapping[str, Any]:
+        """What is too large to be kept of each frame, for those who listen while it lasts."""
+        ...

@@ -71,7 +71,7 @@ class _Life:
         self, monitor: Monitor, mission: Mission, robot: Robot, seed: int, listen: Listener | None
     ) -> None:
         self.monitor, self.mission, self.robot, self.seed = monitor, mission, robot, seed
-        self.listen = listen or (lambda frame: None)
+        self.listen = listen
         self.frames: list[Frame] = []
         self.presented = robot.clock.now()
         self.promised = float("nan")
@@ -137,7 +137,9 @@ class _Life:
                 story=self.robot.story(),
             )
         )
-        self.listen(self.frames[-1])
+        if self.listen is not None:
+            story = {**self.frames[-1].story, **self.robot.picture()}
+            self.listen(replace(self.frames[-1], story=story))
         if plan is not None:
             self.robot.learn(plan)
         sensed = results.get(self.monitor.program.labels[0])

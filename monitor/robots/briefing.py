@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +15,8 @@ from anytime.errors import AnytimeError
 from compiler import CompiledProgram, compile
 from monitor.calibration import calibrate, measure_rhythm
 from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
-from monitor.monitoring import Listener, Monitor
+from monitor.logs import Floor, LogWriter
+from monitor.monitoring import Monitor
 from monitor.policies import Paper, Policy, constant
 from monitor.reports import Report
 from monitor.rhythms import Rhythm
@@ -94,15 +96,26 @@ class Briefing:
         )
 
     def live(
-        self,
-        monitor: Monitor,
-        seed: int,
-        *,
-        clock: Clock | None = None,
-        listen: Listener | None = None,
+        self, monitor: Monitor, seed: int, *, clock: Clock | None = None, log: Path | None = None
     ) -> Report:
-        """Live the mission once."""
-        return monitor.run(self.grid.mission, self.robot(clock), seed=seed, listen=listen)
+        """Live the mission once; log: a file that is written while it goes on."""
+        robot = self.robot(clock)
+        if log is None:
+            return monitor.run(self.grid.mission, robot, seed=seed)
+        scene = self.grid.scene
+        floor = Floor(scene.free, scene.start, scene.goal, scene.radius, density=scene.density)
+        with LogWriter(log) as writer:
+            writer.mission(
+                self.grid.mission,
+                policy=monitor.name,
+                seed=seed,
+                labels=self.program.labels,
+                machine=self.program.machine,
+                floor=floor,
+            )
+            report = monitor.run(self.grid.mission, robot, seed=seed, listen=writer.frame)
+            writer.end(report)
+        return report
 
 
 def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort()) -> Briefing:  # noqa: B008

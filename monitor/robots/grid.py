@@ -167,15 +167,18 @@ class GridRobot:
 
     def story(self) -> Mapping[str, Any]:
         """Of the frame just ended: cells walked [m, 2], lengths planned and walked in cells, cells
-        of the plan [n, 3] with their levels; and the belief now."""
+        of the plan [n, 3] with their levels."""
         plan, self._executed = self._executed, None
         return {
             "path": self._path.tolist() if plan else [list(self.cell)],
             "length": float(self._along[-1]) if plan else 0.0,
             "planned": plan.length if plan else 0.0,
             "plan": plan.plan.plan.tolist() if plan else [],
-            "belief": self.belief,
         }
+
+    def picture(self) -> Mapping[str, Any]:
+        """What is believed of the floor now: probabilities of being blocked [rows, columns]."""
+        return {"belief": self.belief.probabilities()}
 
     def _settle(self) -> None:
         """Bring place and energy up to now."""

@@ -1,0 +1,122 @@
+"""Commands of the experiments: demo, bench, warm-up."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from anytime.command_line import Answer, add_command, progress
+from anytime.errors import AnytimeError
+
+if TYPE_CHECKING:
+    from experiments.benchmarks.figures import Benchmark
+
+BENCHMARKS = ("planner", "compiler", "mission")
+
+
+def declare(commands: Any) -> None:
+    """Declare the sub-commands."""
+    parser = add_command(commands, "demo", demo, "the main job, on an office that ships with us")
+    parser.add_argument("--seeds", type=int, default=100, help="missions a policy (default 100)")
+    parser.add_argument("--seed", type=int, default=0, help="of profiles, and of the page's mission")
+    parser.add_argument("--mission", type=Path, metavar="MISSION.toml")
+    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR")
+    parser = add_command(commands, "bench", bench, "a benchmark: " + ", ".join(BENCHMARKS))
+    parser.add_argument("name", choices=BENCHMARKS)
+    length = parser.add_mutually_exclusive_group()
+    length.add_argument("--quick", action="store_true", help="at most 4 minutes on 2 cores")
+    length.add_argument("--full", action="store_true", help="may take hours")
+    parser.add_argument("--maps", type=Path, metavar="DIR")
+    parser.add_argument("--seed", type=int, default=0)
+    add_command(commands, "warm-up", warm_up, "compile the kernels, so that the first call is fast")
+
+
+def demo(options: argparse.Namespace) -> Answer:
+    """Measure, compile, run the mission monitored and by the baselines; table and report.html."""
+    from experiments import shipped
+    from experiments.demo import run, write_report
+    from monitor.robots.grid_missions import read_mission
+
+    if options.seeds < 2:
+        raise AnytimeError(f"--seeds {options.seeds}: at least 2 are needed for an interval")
+    options.output.mkdir(parents=True, exist_ok=True)
+    grid = read_mission(options.mission or shipped.mission_path())
+    with progress("office") as bar:
+        found = run(
+            grid,
+            seeds=range(options.seeds),
+            seed=options.seed,
+            tell=lambda what, done, total: bar(done, total),
+        )
+    page = write_report(found, options.output, options.seed)
+    return Answer(f"{found!r}\n{page}", _figures(found.benchmark))
+
+
+def bench(options: argparse.Namespace) -> Answer:
+    """Run one benchmark and print its figures; nothing is remembered from an earlier run."""
+    import importlib
+    import sys
+
+    if options.maps is not None and not options.maps.is_dir():
+        raise AnytimeError(f"--maps {options.maps}: no such folder")
+    # BENCHMARKS is a closed list of ours, so this imports by no name that a user gave.
+    benchmark = importlib.import_module(f"experiments.benchmarks.{options.name}")
+    found = benchmark.measure(
+        quick=options.quick,
+        full=options.full,
+        seed=options.seed,
+        maps=options.maps,
+        progress=lambda message: print(message, file=sys.stderr, flush=True),
+    )
+    width = max(len(key) for key in found.figures)
+    lines = [f"{key:<{width}}  {_shown(value)}" for key, value in found.figures.items()]
+    return Answer("\n".join(lines), _figures(found))
+
+
+def warm_up(options: argparse.Namespace) -> Answer:
+    """Compile every kernel that a mission needs; machine code is kept between processes."""
+    import numpy as np
+
+    from anytime import WorkClock, measure
+    from experiments.domains import MACHINE, cross, domain
+    from monitor.robots.grid import Scene
+    from monitor.robots.grid_missions import REFERENCE
+    from monitor.robots.navigation import frame_problems, navigate
+
+    small = domain("r10", 32, 0)
+    scene = Scene(small.free, small.start, small.goal, radius=16, frame=8.0)
+    frames = list(frame_problems(scene, np.random.default_rng(0), 1))
+    measure(navigate, frames, seconds=8.0, clock=lambda: WorkClock(REFERENCE))
+    measure(cross, [small], seconds=1.0, clock=lambda: WorkClock(MACHINE))
+    return Answer("kernels are compiled", {"compiled": True})
+
+
+def _shown(value: float | int | None) -> str:
+    if value is None:
+        return "—"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _figures(found: Benchmark) -> dict[str, Any]:
+    machine = {"python": platform.python_version(), "system": platform.platform()}
+    return {
+        "name": found.name,
+        "figures": _nested(found.figures),
+        "settings": dict(found.settings),
+        "machine": machine,
+        "seed": found.seed,
+    }
+
+
+def _nested(figures: Any) -> dict[str, Any]:
+    """Dotted names as nested objects."""
+    tree: dict[str, Any] = {}
+    for key, value in figures.items():
+        *folders, last = key.split(".")
+        place = tree
+        for folder in folders:
+            place = place.setdefault(folder, {})
+        place[last] = value
+    return tree

@@ -1,0 +1,264 @@
+"""The sentences of the replay page, each made of the numbers of the log and nothing else."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from anytime.pictures import duration, number
+from monitor.logs import CallLine, FrameLine, Log, MomentLine
+from monitor.page.losses import Loss, costliest, loss_of
+
+STEP = 0.5  # seconds that "a little more thinking" means
+BAND = 0.1  # how far an estimate may lie from what its profile advertised
+
+
+def headline(log: Log, frame: FrameLine, moment: MomentLine) -> str:
+    """What was decided and whether a little more thinking would have paid."""
+    drove = f"drove at {number(moment.speed)} {speed_unit(log)}"
+    if not frame.calls:
+        where = "to the goal" if frame.index == len(log.frames) - 1 else "on"
+        return f"Nothing left to plan: {drove} {where} for {duration(frame.driven)}."
+    gave = _shares(moment.shares)
+    did = f"Stood, gave {gave}" if frame.standing else f"Gave {gave}, {drove}"
+    more = gain(moment, STEP)
+    if more is not None:
+        return f"{did}: {duration(STEP)} more would {_change(more)}."
+    less = gain(moment, -STEP)
+    if less is not None:
+        return f"{did}: there was no longer contract, and {duration(STEP)} less would {_change(less)}."
+    return f"{did}: the division is fixed, nothing was weighed."
+
+
+def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
+    """Why stop here?"""
+    if moment.net is None or len(moment.curve) < 2:
+        return (
+            f"The division is fixed: {_shares(moment.shares)} in every frame, "
+            f"{duration(moment.contract)} in all; no other was weighed."
+        )
+    known = [(at, net) for at, net in moment.curve if net is not None]
+    peak, best = max(known, key=lambda point: point[1])
+    parts = [
+        f"Of {len(known)} contracts from {duration(known[0][0])} to {duration(known[-1][0])}, "
+        f"{duration(peak)} promised most: a net value of {number(best)}"
+        f" ({number(moment.value or 0.0)} of value − {number(moment.cost or 0.0)} of energy)"
+    ]
+    moves = []
+    for step, word in ((STEP, "more"), (-STEP, "less")):
+        change = gain(moment, step)
+        if change is not None:
+            moves.append(f"{duration(STEP)} {word} would {_change(change)}")
+    sentence = "; ".join([*parts, " and ".join(moves)] if moves else parts) + "."
+    if moment.moment == "call":
+        before = frame.moments[0].speed
+        sentence += (
+            f" At {duration(moment.time - frame.started)} into the frame the speed went from "
+            f"{number(before)} to {number(moment.speed)} ({moment.case})."
+        )
+    return sentence
+
+
+def fixed(log: Log, frame: FrameLine, moment: MomentLine, division: Mapping | None) -> str:
+    """What would fixed have done?"""
+    net = log.net or 0.0
+    if log.mission.policy == "fixed":
+        return f"This is the fixed division: {_shares(moment.shares)}; it made {number(net)}."
+    if not division:
+        return (
+            f"This log made {number(net)} and has no fixed division beside it; "
+            f"anytime run MISSION --policy fixed --seed {log.mission.seed} adds one."
+        )
+    shares = division["shares"]
+    contract = sum(shares.values())
+    sentence = (
+        f"Fixed would have given {_shares(shares)} at {number(division['speed'])} "
+        f"{speed_unit(log)}, as in every frame"
+    )
+    here = worth_at(moment, contract)
+    if frame.calls and here is not None and moment.net is not None:
+        apart = contract - moment.contract
+        word = "more" if apart > 0 else "less"
+        sentence += (
+            f": {duration(abs(apart))} {word} than was chosen here, "
+            f"{_worth(here - moment.net)} by the curve"
+        )
+    made = division.get("net")
+    if made is None:
+        return sentence + "."
+    ahead = net - made
+    word = "less" if ahead >= 0 else "more"
+    return f"{sentence}. Over the mission it made {number(made)}, {number(abs(ahead))} {word}."
+
+
+def losses(log: Log) -> str:
+    """Where was most lost?"""
+    ranked = costliest(log)
+    if not ranked:
+        return "0 frames so far, so nothing is lost yet."
+    whole = sum(loss.total for loss in ranked)
+    worst = ranked[0]
+    waited = sum(loss.wait for loss in ranked)
+    three = sum(loss.total for loss in ranked[:3])
+    shares = f"{three / whole:.0%}" if whole > 0 else "0 %"
+    return (
+        f"In frame {worst.index}: {_loss(worst)}. The costliest {min(3, len(ranked))} of "
+        f"{len(ranked)} frames took {number(three)} of {number(whole)} ({shares}); "
+        f"standing still cost {number(waited)} in all."
+    )
+
+
+def here_lost(log: Log, frame: FrameLine) -> str:
+    """What this frame lost."""
+    rank = [loss.index for loss in costliest(log)].index(frame.index) + 1
+    return f"This frame: {_loss(loss_of(log, frame))}; the {_ordinal(rank)} costliest."
+
+
+def profile(log: Log) -> str:
+    """Was the profile right?"""
+    pairs = compared(log)
+    if not pairs:
+        calls = sum(len(frame.calls) for frame in log.frames)
+        return f"Nothing was advertised for these {calls} calls, so nothing can be compared."
+    apart = np.array([seen - advertised for _, advertised, seen in pairs])
+    outside = int((np.abs(apart) > BAND).sum())
+    advertised, seen = (np.mean([pair[place] for pair in pairs]) for place in (1, 2))
+    share = outside / len(pairs)
+    verdict = "Yes" if share <= 0.1 else "Mostly" if share <= 0.3 else "No"
+    return (
+        f"{verdict}: advertised {number(float(advertised))} and seen {number(float(seen))} on the "
+        f"mean of {len(pairs)} results; {outside} lay more than {number(BAND)} off, "
+        f"{int((apart < -BAND).sum())} of them below."
+    )
+
+
+def here_seen(frame: FrameLine) -> str:
+    """Expected against seen in this frame."""
+    parts = []
+    for call in frame.calls:
+        if call.estimate is None:
+            continue
+        text = f"{call.label} saw {number(call.estimate)}"
+        if call.advertised is not None:
+            text += f", {number(call.advertised)} was advertised"
+        parts.append(text)
+    return f"Here {'; '.join(parts)}." if parts else ""
+
+
+def price(frame: FrameLine, moment: MomentLine, prices: Mapping[str, float | None]) -> str:
+    """Who pays for another millisecond?"""
+    known = {label: price for label, price in prices.items() if price is not None}
+    if not frame.calls or not known:
+        return "Nobody: 0 calls are left to pay for." if not frame.calls else (
+            f"Unknown: the {duration(moment.contract)} were not weighed against any other."
+        )
+    if set(known) == {"thinking"}:
+        rate = known["thinking"]
+        who = "All calls together pay" if rate > 0 else "Nobody pays"
+        return (
+            f"{who}: another millisecond of contract is worth {rate / 1e3:+.2g} "
+            f"({rate:+.2f} a second), whichever call gets it."
+        )
+    label = max(known, key=lambda name: known[name])
+    listed = ", ".join(f"{name} {rate / 1e3:+.2g}" for name, rate in known.items())
+    who = label if known[label] > 0 else "Nobody"
+    return f"{who} pays most for another millisecond: {listed}."
+
+
+def prices_of(frame: FrameLine, moment: MomentLine) -> dict[str, float | None]:
+    """Net value of one more second, by call; of all together where only the curve is known."""
+    if frame.prices:
+        return dict(frame.prices)
+    more = gain(moment, STEP)
+    return {"thinking": None if more is None else more / STEP}
+
+
+def gain(moment: MomentLine, seconds: float) -> float | None:
+    """Change of the foreseen net value if the contract were longer; None off the curve's ends."""
+    chosen, other = worth_at(moment, moment.contract), worth_at(moment, moment.contract + seconds)
+    return None if chosen is None or other is None else other - chosen
+
+
+def worth_at(moment: MomentLine, contract: float) -> float | None:
+    """The foreseen net value of a contract time, from the curve; None beyond its ends."""
+    known = [(at, net) for at, net in moment.curve if net is not None]
+    if len(known) < 2 or not known[0][0] - 1e-9 <= contract <= known[-1][0] + 1e-9:
+        return None
+    times, nets = zip(*known, strict=True)
+    return float(np.interp(contract, times, nets))
+
+
+def worth_of(moment: MomentLine) -> float:
+    """What a decision was worth: its net value over that of the mean contract considered."""
+    known = [net for _, net in moment.curve if net is not None]
+    return max(known) - float(np.mean(known)) if known else 0.0
+
+
+def compared(log: Log) -> list[tuple[int, float, float]]:
+    """(frame, advertised, seen) of every result that was foreseen."""
+    return [
+        (frame.index, call.advertised, call.estimate)
+        for frame in log.frames
+        for call in frame.calls
+        if call.advertised is not None and call.estimate is not None
+    ]
+
+
+def call_text(call: CallLine) -> str:
+    """One call in one line, for the pointer that rests on it."""
+    text = f"{call.label}: {duration(call.elapsed)} of {duration(call.share)}, {call.status}"
+    if call.overrun > 0:
+        text += f", {duration(call.overrun)} over"
+    return f"{text}, {call.fault}" if call.fault else text
+
+
+def speed_unit(log: Log) -> str:
+    """Unit of speeds."""
+    return "cells/s" if log.mission.scene else "lengths/s"
+
+
+def escaped(text: str) -> str:
+    """Text for HTML."""
+    return html.escape(text)
+
+
+def _shares(shares: Mapping[str, float]) -> str:
+    parts = [f"{label} {duration(seconds)}" for label, seconds in shares.items()]
+    if len(parts) < 2:
+        return "".join(parts)
+    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _change(change: float) -> str:
+    if abs(change) < 0.005:
+        return f"change nothing (±{number(0.005)})"
+    return f"{'gain' if change > 0 else 'lose'} {number(abs(change))}"
+
+
+def _worth(change: float) -> str:
+    word = "more" if change > 0 else "less"
+    return f"worth {number(abs(change))} {word}"
+
+
+def _loss(loss: Loss) -> str:
+    parts: Sequence[tuple[str, float]] = (
+        ("driving", loss.drive),
+        ("standing", loss.wait),
+        ("energy", loss.energy),
+    )
+    shown = ", ".join(f"{number(part)} to {name}" for name, part in parts if part > 5e-4)
+    return f"{number(loss.total)} lost ({shown})" if shown else f"{number(loss.total)} lost"
+
+
+def _ordinal(rank: int) -> str:
+    if rank % 100 in (11, 12, 13):
+        return f"{rank}th"
+    return f"{rank}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(rank % 10, 'th')}"
+
+
+def finite(value: float | None) -> float | None:
+    """None in place of what JSON cannot hold."""
+    return None if value is None or not math.isfinite(value) else value

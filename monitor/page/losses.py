@@ -1,0 +1,83 @@
+"""Where a mission's value went: to driving, to waiting, to energy, frame by frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from monitor.logs import FrameLine, Log
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a frame took from the net value.
+
+    drive, wait: value that ran out while the robot moved and stood. energy: price × energy used.
+    """
+
+    index: int
+    drive: float
+    wait: float
+    energy: float
+
+    @property
+    def total(self) -> float:
+        return self.drive + self.wait + self.energy
+
+
+@dataclass(frozen=True)
+class Step:
+    """A bar of the waterfall: from what is there before it to what is left after it."""
+
+    name: str
+    before: float
+    after: float
+    sum: bool = False
+
+    @property
+    def size(self) -> float:
+        return self.after - self.before
+
+
+def loss_of(log: Log, frame: FrameLine) -> Loss:
+    """The loss of one frame; the value that runs out is shared by the time moved and stood."""
+    late = log.mission.worth(frame.started) - log.mission.worth(frame.ended)
+    length = frame.ended - frame.started
+    moved = min(max(frame.driven / length, 0.0), 1.0) if length > 0 else 0.0
+    energy = log.mission.energy["price"] * frame.energy
+    return Loss(frame.index, late * moved, late * (1.0 - moved), energy)
+
+
+def waterfall(log: Log) -> list[Step]:
+    """From the worth of the task down to its net value; the steps add up to it exactly."""
+    losses = [loss_of(log, frame) for frame in log.frames]
+    steps: list[Step] = []
+    left = worth = log.mission.worth(0.0)
+    steps.append(Step("worth", 0.0, worth, sum=True))
+    for name in ("drive", "wait"):
+        lost = sum(getattr(loss, name) for loss in losses)
+        steps.append(Step(name, left, left - lost))
+        left -= lost
+    end = log.end
+    finished = log.frames[-1].ended if log.frames else 0.0
+    if end is not None:
+        job = log.mission.worth(finished) - log.mission.worth(end.seconds)
+        if job > 0:
+            steps.append(Step("job", left, left - job))
+            left -= job
+        # What was not reached earns nothing, whatever it would still be worth.
+        if left - end.earned > 1e-6 * worth:
+            steps.append(Step("not reached", left, end.earned))
+            left = end.earned
+    spent = log.mission.energy["price"] * (
+        end.energy if end else sum(frame.energy for frame in log.frames)
+    )
+    steps.append(Step("energy", left, left - spent))
+    left -= spent
+    steps.append(Step("net" if end else "net so far", 0.0, left, sum=True))
+    return steps
+
+
+def costliest(log: Log) -> list[Loss]:
+    """The frames by what they lost, the worst first."""
+    losses = [loss_of(log, frame) for frame in log.frames]
+    return sorted(losses, key=lambda loss: (-loss.total, loss.index))

@@ -1,0 +1,192 @@
+"""From logs to one HTML file that needs no network."""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from anytime.files import write_atomically
+from anytime.pictures import duration, number
+from monitor.logs import FrameLine, Log, MomentLine, plain
+from monitor.page import answers
+from monitor.page.losses import costliest, loss_of, waterfall
+
+
+def render(log: Log) -> str:
+    """The page of one mission."""
+    return render_all([log])
+
+
+def render_all(
+    logs: Sequence[Log], *, summary: str = "", title: str = "", live: bool = False
+) -> str:
+    """One page of several missions, a tab each.
+
+    summary: trusted HTML shown above, for instance a table. live: the page listens to `events`.
+    """
+    data = page_data(logs)
+    name = title or (f"{logs[0].mission.name}, seed {logs[0].mission.seed}" if logs else "replay")
+    parts = {
+        "title": html.escape(name),
+        "style": _part("replay.css"),
+        "summary": f'<section id="summary">{summary}</section>' if summary else "",
+        "live": "true" if live else "false",
+        # In a script element `<` alone can end or nest it; the separators are JavaScript's.
+        "data": _safe(json.dumps(data, separators=(",", ":"), allow_nan=False)),
+        "code": _part("replay.js"),
+    }
+    page = _part("template.html")
+    for key, text in parts.items():
+        head, mark, tail = page.partition("{{" + key + "}}")
+        assert mark, key
+        page = head + text + tail
+    return page
+
+
+def write_page(
+    logs: Sequence[Log], path: Path | str, *, summary: str = "", title: str = ""
+) -> Path:
+    """Write the page of these missions; the file is whole or absent."""
+    path = Path(path)
+    write_atomically(path, render_all(logs, summary=summary, title=title).encode())
+    return path
+
+
+def page_data(logs: Sequence[Log]) -> dict[str, Any]:
+    """What the page draws, as plain data: numbers, and the sentences made of them."""
+    return plain({"band": answers.BAND, "runs": [_run(log, _fixed(log, logs)) for log in logs]})
+
+
+def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
+    mission, end = log.mission, log.end
+    steps = waterfall(log)
+    ranked = [loss.index for loss in costliest(log)]
+    return {
+        "name": mission.policy,
+        "mission": mission.name,
+        "seed": mission.seed,
+        "machine": mission.machine,
+        "state": _state(log),
+        "ending": end.ending if end else None,
+        "net": log.net,
+        "promised": log.promised,
+        "seconds": end.seconds if end else (log.frames[-1].ended if log.frames else 0.0),
+        "labels": mission.labels,
+        "unit": answers.speed_unit(log),
+        "scene": _scene(log),
+        "fixed": sum(division["shares"].values()) if division else None,
+        "frames": [_frame(log, frame, division) for frame in log.frames],
+        "worst": ranked,
+        "waterfall": [
+            {"name": step.name, "before": step.before, "after": step.after, "sum": step.sum}
+            for step in steps
+        ],
+        "losses": answers.losses(log),
+        "profile": answers.profile(log),
+        "compared": answers.compared(log),
+        "job": end.job if end else 0.0,
+    }
+
+
+def _state(log: Log) -> str:
+    if log.end is None:
+        return f"under way, {len(log.frames)} frames so far"
+    text = f"{log.end.ending.replace('_', ' ')} after {duration(log.end.seconds)}"
+    promised = "" if log.promised is None else f" (promised {number(log.promised)})"
+    fault = f" — {log.end.fault}" if log.end.fault else ""
+    return f"{text}, net value {number(log.end.net)}{promised}{fault}"
+
+
+def _scene(log: Log) -> dict[str, Any] | None:
+    scene = log.mission.scene
+    if scene is None:
+        return None
+    return {
+        "rows": scene.rows,
+        "columns": scene.columns,
+        "step": scene.step,
+        "start": scene.start,
+        "goal": scene.goal,
+        "radius": scene.radius,
+        "density": scene.density,
+        "truth": scene.truth,
+    }
+
+
+def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> dict[str, Any]:
+    loss = loss_of(log, frame)
+    box = frame.belief
+    return {
+        "index": frame.index,
+        "started": frame.started,
+        "ended": frame.ended,
+        "standing": frame.standing,
+        "interrupted": frame.interrupted,
+        "driven": frame.driven,
+        "so_far": frame.so_far,
+        "lost": [loss.drive, loss.wait, loss.energy],
+        "here_lost": answers.here_lost(log, frame),
+        "here_seen": answers.here_seen(frame),
+        "path": frame.path,
+        "plan": frame.plan,
+        "belief": [box.row, box.column, box.rows, box.columns, box.levels] if box else None,
+        "calls": [
+            {
+                "label": call.label,
+                "started": call.started,
+                "elapsed": call.elapsed,
+                "share": call.share,
+                "overrun": call.overrun,
+                "status": call.status,
+                "text": answers.call_text(call),
+            }
+            for call in frame.calls
+        ],
+        "moments": [_moment(log, frame, moment, division) for moment in frame.moments],
+    }
+
+
+def _moment(
+    log: Log, frame: FrameLine, moment: MomentLine, division: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    prices = answers.prices_of(frame, moment)
+    return {
+        "time": moment.time,
+        "kind": moment.moment,
+        "shares": moment.shares,
+        "contract": moment.contract,
+        "speed": moment.speed,
+        "net": moment.net,
+        "curve": moment.curve,
+        "chosen": answers.worth_at(moment, moment.contract),
+        "worth": answers.worth_of(moment),
+        "prices": prices,
+        "headline": answers.headline(log, frame, moment),
+        "why": answers.why(log, frame, moment),
+        "fixed": answers.fixed(log, frame, moment, division),
+        "price": answers.price(frame, moment, prices),
+    }
+
+
+def _fixed(log: Log, logs: Sequence[Log]) -> Mapping[str, Any] | None:
+    """The fixed division to compare with: the log's own, or the fixed mission beside it."""
+    if log.mission.fixed:
+        return log.mission.fixed
+    for other in logs:
+        same = (other.mission.name, other.mission.seed) == (log.mission.name, log.mission.seed)
+        if other is not log and same and other.mission.policy == "fixed" and other.frames:
+            decision = other.frames[0].moments[0]
+            return {"shares": decision.shares, "speed": decision.speed, "net": other.net}
+    return None
+
+
+def _part(name: str) -> str:
+    return (files("monitor.page") / name).read_text(encoding="utf-8")
+
+
+def _safe(text: str) -> str:
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")

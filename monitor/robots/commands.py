@@ -1,0 +1,97 @@
+"""Commands of the robots: run a monitored mission."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from anytime.command_line import Answer, add_command
+from anytime.errors import AnytimeError
+
+if TYPE_CHECKING:
+    from monitor.robots.grid_missions import GridMission
+
+
+def declare(commands: Any) -> None:
+    """Declare the sub-commands."""
+    parser = add_command(commands, "run", run, "live a monitored mission and write its page")
+    parser.add_argument("mission", type=Path, metavar="MISSION.toml")
+    parser.add_argument("--map", type=Path, metavar="FILE", help="another floor (.map or .yaml)")
+    parser.add_argument("--start", type=_cell, metavar="ROW,COLUMN")
+    parser.add_argument("--goal", type=_cell, metavar="ROW,COLUMN")
+    parser.add_argument("--scenario", type=int, metavar="N", help="the N-th of the map's .scen")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--policy", default="expected", help="expected, paper, fixed, min or max")
+    parser.add_argument("--clock", choices=["work", "wall"], default="work")
+    parser.add_argument("--library", type=Path, metavar="DIR", help="default: shipped profiles")
+    parser.add_argument("--log", type=Path, default=Path("anytime-run"), metavar="DIR")
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Live one mission and write its log and its page into a folder."""
+    from importlib.resources import files
+
+    from anytime import ProfileLibrary, WallClock, WorkClock
+    from monitor.logs import read_log
+    from monitor.page import write_page
+    from monitor.robots.briefing import POLICIES, QUICK, Effort, brief
+    from monitor.robots.grid_missions import read_mission
+
+    if options.policy not in POLICIES:
+        raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
+    start, goal = options.start, options.goal
+    if options.scenario is not None:
+        start, goal = _ends(options.map, options.scenario)
+    grid = read_mission(options.mission, map_path=options.map, start=start, goal=goal)
+    folder = options.library or Path(str(files("experiments") / "data" / "profiles"))
+    briefing = brief(grid, ProfileLibrary(folder), QUICK if options.map else Effort())
+    clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
+    monitor = briefing.monitor(options.policy)
+    log = options.log / "mission.jsonl"
+    report = briefing.live(monitor, options.seed, clock=clock, log=log)
+    page = write_page([read_log(log)], options.log / "mission.html")
+    return Answer(
+        f"{report!r}\n{_wide(grid)}\nlog {log}, page {page}",
+        {
+            "ending": report.ending.value,
+            "net": report.net,
+            "promised": report.promised,
+            "seconds": report.seconds,
+            "energy": report.energy,
+            "frames": len(report.frames),
+            "ledger": report.ledger,
+            "log": str(log),
+            "page": str(page),
+        },
+        0 if report else 1,
+    )
+
+
+def _wide(grid: GridMission) -> str:
+    rows, columns = grid.scene.free.shape
+    return (
+        f"{grid.scene.name}, {rows} × {columns} cells, from {grid.scene.start} to "
+        f"{grid.scene.goal}, shortest way {grid.scene.optimal:.1f} cells"
+    )
+
+
+def _ends(floor: Path | None, index: int) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Start and goal of a map's published scenario."""
+    from sensing import read_map, read_scenarios
+
+    if floor is None:
+        raise AnytimeError("--scenario belongs to a map; add --map FILE.map")
+    file = floor.with_name(f"{floor.name}.scen")
+    scenarios = read_scenarios(file, read_map(floor))
+    if not 0 <= index < len(scenarios):
+        raise AnytimeError(f"{file} has scenarios 0 to {len(scenarios) - 1}, not {index}")
+    return scenarios[index].start, scenarios[index].goal
+
+
+def _cell(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d{1,6}),(\d{1,6})", text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not ROW,COLUMN")
+    return int(found[1]), int(found[2])
