@@ -20,8 +20,8 @@ from sensing import FAMILIES, OPTIMUM_TOLERANCE, instance, map_folder, read_map,
 _FAMILY, _SIZE = "r20", 128
 _LARGER = (64, 256, 512)
 _RESAMPLES = 2000
-# Figures of a planner that goes beyond the paper's, whose completed plans end at about 0.96.
-_PAPER_ONLY = "measured here is the paper's planner alone, which completes near 0.96"
+# Figures of a planner that goes beyond the paper's.
+_PAPER_ONLY = "measured here is the paper's planner alone"
 _LIMIT_KEYS = (
     *(
         f"iid.{size}.{density}.{what}_{level}"
