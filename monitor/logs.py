@@ -1,4 +1,4 @@
-"""The log of a mission: one line a frame, append-only, the same bytes for the same mission and seed.
+"""The log of a mission: a line a frame, append-only, the same bytes for the same seed.
 
 Nothing of the machine's wall is in it (host, versions, time of day): that lies beside, in
 `wall.json`.
@@ -271,6 +271,7 @@ class LogWriter:
             "gain": mission.gain,
             "scene": _scene(floor) if floor else None,
         }
+        fixed = fixed or _division(mission.fixed)
         if fixed:
             line["fixed"] = dict(fixed)
         self._write(line)
@@ -358,7 +359,7 @@ class LogWriter:
             "column": left,
             "rows": box.shape[0],
             "columns": box.shape[1],
-            "levels": _text((flat[::2] << 4) | flat[1::2]),
+            "levels": _text(flat[::2] * np.uint8(16) + flat[1::2]),
         }
 
     def _write(self, line: Mapping[str, Any]) -> None:
@@ -475,6 +476,12 @@ def plain(value: Any) -> Any:
     raise AnytimeError(
         f"a {type(value).__name__} cannot be logged; a story is numbers, texts, lists and arrays"
     )
+
+
+def _division(tuned: Mapping[str, float]) -> dict[str, Any]:
+    """A mission's fixed division, {call: seconds, "speed": …}, as a log has it."""
+    shares = {name: seconds for name, seconds in tuned.items() if name != "speed"}
+    return {"shares": shares, "speed": tuned["speed"]} if shares and "speed" in tuned else {}
 
 
 def _scene(floor: Floor) -> dict[str, Any]:

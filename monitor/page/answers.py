@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import html
-import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from anytime.pictures import duration, number
+from anytime.pictures import number
 from monitor.logs import CallLine, FrameLine, Log, MomentLine
 from monitor.page.losses import Loss, costliest, loss_of
 
-STEP = 0.5  # seconds that "a little more thinking" means
+STEP, STEP_TEXT = 0.5, "0.5 s"  # what "a little more thinking" means
 BAND = 0.1  # how far an estimate may lie from what its profile advertised
 
 
@@ -21,15 +19,15 @@ def headline(log: Log, frame: FrameLine, moment: MomentLine) -> str:
     drove = f"drove at {number(moment.speed)} {speed_unit(log)}"
     if not frame.calls:
         where = "to the goal" if frame.index == len(log.frames) - 1 else "on"
-        return f"Nothing left to plan: {drove} {where} for {duration(frame.driven)}."
+        return f"Nothing left to plan: {drove} {where} for {span(frame.driven)}."
     gave = _shares(moment.shares)
     did = f"Stood, gave {gave}" if frame.standing else f"Gave {gave}, {drove}"
     more = gain(moment, STEP)
     if more is not None:
-        return f"{did}: {duration(STEP)} more would {_change(more)}."
+        return f"{did}: {STEP_TEXT} more would {_change(more)}."
     less = gain(moment, -STEP)
     if less is not None:
-        return f"{did}: there was no longer contract, and {duration(STEP)} less would {_change(less)}."
+        return f"{did}: there was no longer contract, and {STEP_TEXT} less would {_change(less)}."
     return f"{did}: the division is fixed, nothing was weighed."
 
 
@@ -38,25 +36,25 @@ def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
     if moment.net is None or len(moment.curve) < 2:
         return (
             f"The division is fixed: {_shares(moment.shares)} in every frame, "
-            f"{duration(moment.contract)} in all; no other was weighed."
+            f"{span(moment.contract)} in all; no other was weighed."
         )
     known = [(at, net) for at, net in moment.curve if net is not None]
     peak, best = max(known, key=lambda point: point[1])
     parts = [
-        f"Of {len(known)} contracts from {duration(known[0][0])} to {duration(known[-1][0])}, "
-        f"{duration(peak)} promised most: a net value of {number(best)}"
+        f"Of {len(known)} contracts from {span(known[0][0])} to {span(known[-1][0])}, "
+        f"{span(peak)} promised most: a net value of {number(best)}"
         f" ({number(moment.value or 0.0)} of value − {number(moment.cost or 0.0)} of energy)"
     ]
     moves = []
     for step, word in ((STEP, "more"), (-STEP, "less")):
         change = gain(moment, step)
         if change is not None:
-            moves.append(f"{duration(STEP)} {word} would {_change(change)}")
+            moves.append(f"{STEP_TEXT} {word} would {_change(change)}")
     sentence = "; ".join([*parts, " and ".join(moves)] if moves else parts) + "."
     if moment.moment == "call":
         before = frame.moments[0].speed
         sentence += (
-            f" At {duration(moment.time - frame.started)} into the frame the speed went from "
+            f" At {span(moment.time - frame.started)} into the frame the speed went from "
             f"{number(before)} to {number(moment.speed)} ({moment.case})."
         )
     return sentence
@@ -83,7 +81,7 @@ def fixed(log: Log, frame: FrameLine, moment: MomentLine, division: Mapping | No
         apart = contract - moment.contract
         word = "more" if apart > 0 else "less"
         sentence += (
-            f": {duration(abs(apart))} {word} than was chosen here, "
+            f": {span(abs(apart))} {word} than was chosen here, "
             f"{_worth(here - moment.net)} by the curve"
         )
     made = division.get("net")
@@ -128,6 +126,8 @@ def profile(log: Log) -> str:
     advertised, seen = (np.mean([pair[place] for pair in pairs]) for place in (1, 2))
     share = outside / len(pairs)
     verdict = "Yes" if share <= 0.1 else "Mostly" if share <= 0.3 else "No"
+    if verdict == "No":
+        verdict += ", it promised too much" if seen < advertised else ", it promised too little"
     return (
         f"{verdict}: advertised {number(float(advertised))} and seen {number(float(seen))} on the "
         f"mean of {len(pairs)} results; {outside} lay more than {number(BAND)} off, "
@@ -152,20 +152,23 @@ def price(frame: FrameLine, moment: MomentLine, prices: Mapping[str, float | Non
     """Who pays for another millisecond?"""
     known = {label: price for label, price in prices.items() if price is not None}
     if not frame.calls or not known:
-        return "Nobody: 0 calls are left to pay for." if not frame.calls else (
-            f"Unknown: the {duration(moment.contract)} were not weighed against any other."
+        return (
+            "Nobody: 0 calls are left to pay for."
+            if not frame.calls
+            else (f"Unknown: the {span(moment.contract)} were not weighed against any other.")
         )
     if set(known) == {"thinking"}:
         rate = known["thinking"]
-        who = "All calls together pay" if rate > 0 else "Nobody pays"
+        who = "All calls together would pay" if rate > 0 else "Nobody"
         return (
-            f"{who}: another millisecond of contract is worth {rate / 1e3:+.2g} "
-            f"({rate:+.2f} a second), whichever call gets it."
+            f"{who}: a millisecond more of contract would {_rate(rate / 1e3)}, "
+            f"{number(abs(rate))} a second, whichever call got it."
         )
     label = max(known, key=lambda name: known[name])
-    listed = ", ".join(f"{name} {rate / 1e3:+.2g}" for name, rate in known.items())
-    who = label if known[label] > 0 else "Nobody"
-    return f"{who} pays most for another millisecond: {listed}."
+    listed = ", ".join(f"{name} would {_rate(rate / 1e3)}" for name, rate in known.items())
+    if known[label] <= 0:
+        return f"Nobody pays for another millisecond: {listed}."
+    return f"{label} pays most for another millisecond: {listed}."
 
 
 def prices_of(frame: FrameLine, moment: MomentLine) -> dict[str, float | None]:
@@ -209,9 +212,9 @@ def compared(log: Log) -> list[tuple[int, float, float]]:
 
 def call_text(call: CallLine) -> str:
     """One call in one line, for the pointer that rests on it."""
-    text = f"{call.label}: {duration(call.elapsed)} of {duration(call.share)}, {call.status}"
+    text = f"{call.label}: {span(call.elapsed)} of {span(call.share)}, {call.status}"
     if call.overrun > 0:
-        text += f", {duration(call.overrun)} over"
+        text += f", {span(call.overrun)} over"
     return f"{text}, {call.fault}" if call.fault else text
 
 
@@ -220,13 +223,13 @@ def speed_unit(log: Log) -> str:
     return "cells/s" if log.mission.scene else "lengths/s"
 
 
-def escaped(text: str) -> str:
-    """Text for HTML."""
-    return html.escape(text)
+def span(seconds: float) -> str:
+    """A time in a sentence: 436 ms, 1.25 s."""
+    return f"{1e3 * seconds:.0f} ms" if seconds < 1 else f"{seconds:.2f} s"
 
 
 def _shares(shares: Mapping[str, float]) -> str:
-    parts = [f"{label} {duration(seconds)}" for label, seconds in shares.items()]
+    parts = [f"{label} {span(seconds)}" for label, seconds in shares.items()]
     if len(parts) < 2:
         return "".join(parts)
     return f"{', '.join(parts[:-1])} and {parts[-1]}"
@@ -236,6 +239,10 @@ def _change(change: float) -> str:
     if abs(change) < 0.005:
         return f"change nothing (±{number(0.005)})"
     return f"{'gain' if change > 0 else 'lose'} {number(abs(change))}"
+
+
+def _rate(rate: float) -> str:
+    return f"{'gain' if rate > 0 else 'lose'} {abs(rate):.2g}"
 
 
 def _worth(change: float) -> str:
@@ -256,9 +263,4 @@ def _loss(loss: Loss) -> str:
 def _ordinal(rank: int) -> str:
     if rank % 100 in (11, 12, 13):
         return f"{rank}th"
-    return f"{rank}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(rank % 10, 'th')}"
-
-
-def finite(value: float | None) -> float | None:
-    """None in place of what JSON cannot hold."""
-    return None if value is None or not math.isfinite(value) else value
+    return f"{rank}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(rank % 10, 'th') }"

@@ -1,0 +1,221 @@
+"""The replay page, as text and as a browser shows it."""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+import urllib.error
+import urllib.request
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from anytime.errors import AnytimeError
+from monitor.endings import Ending
+from monitor.logs import LogWriter, read_log, write_log
+from monitor.page import page_data, render, write_page
+from monitor.page.losses import costliest, waterfall
+from monitor.serving import serve
+
+QUESTIONS = ("why", "fixed", "losses", "profile", "price")
+
+
+@pytest.fixture
+def logs(tmp_path, mission, floor, made_up):
+    """The same mission by three policies."""
+    return [
+        read_log(write_log(tmp_path / f"{policy}.jsonl", mission, floor, made_up(frames, policy)))
+        for policy, frames in (("expected", 6), ("min", 9), ("fixed", 7))
+    ]
+
+
+def test_the_page_needs_nothing_from_elsewhere(logs):
+    page = render(logs[0])
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:)""", page)
+    assert "url(" not in page.replace("url(#", "")
+    assert "default-src 'none'" in page
+
+
+def test_names_in_a_log_cannot_become_code(tmp_path, mission, floor, report):
+    evil = "</script><script>alert(1)</script>{{code}}"
+    told = replace(report, policy=evil, fault=evil)
+    log = read_log(write_log(tmp_path / "a.jsonl", replace(mission, name=evil), floor, told))
+    page = render(log)
+    assert page.count("</script>") == 2
+    assert "<script>alert" not in page
+
+
+def test_the_same_log_gives_the_same_page(logs, tmp_path):
+    assert render(logs[0]) == render(logs[0])
+    page = write_page(logs, tmp_path / "all.html", summary="<table></table>")
+    assert '<section id="summary"><table></table></section>' in page.read_text()
+
+
+def test_the_waterfall_adds_up(logs):
+    for log in logs:
+        steps = waterfall(log)
+        assert steps[0].after == log.mission.worth(0.0)
+        for one, next_one in pairwise(steps[:-1]):
+            assert next_one.before == pytest.approx(one.after)
+        assert steps[-1].after == pytest.approx(steps[-2].after)
+        assert steps[-1].after == pytest.approx(log.net, abs=1e-6)
+
+
+def test_a_mission_that_was_not_reached_earns_nothing(tmp_path, mission, floor, report):
+    told = replace(report, ending=Ending.BLOCKED, earned=0.0, net=-0.2 * report.energy)
+    log = read_log(write_log(tmp_path / "a.jsonl", mission, floor, told))
+    steps = {step.name: step for step in waterfall(log)}
+    assert steps["not reached"].after == 0.0
+    assert steps["net"].after == pytest.approx(told.net)
+
+
+def test_the_costliest_frame_is_the_one_that_used_more_energy(logs):
+    assert costliest(logs[0])[0].index == 2
+
+
+def test_each_question_is_answered_with_a_number(logs):
+    run = page_data(logs)["runs"][0]
+    for frame in run["frames"]:
+        for moment in frame["moments"]:
+            for answer in (moment["why"], moment["fixed"], moment["price"], moment["headline"]):
+                assert re.search(r"\d", answer), answer
+    assert re.search(r"\d", run["losses"])
+    assert re.search(r"\d", run["profile"])
+
+
+def test_the_sentence_says_what_more_thinking_would_have_gained(logs):
+    sentence = page_data(logs)["runs"][0]["frames"][1]["moments"][0]["headline"]
+    assert sentence == (
+        "Gave see 700 ms and find_path 300 ms, drove at 4.00 cells/s: 0.5 s more would lose 6.50."
+    )
+
+
+def test_without_a_fixed_mission_the_page_says_how_to_get_one(logs):
+    alone = page_data(logs[:1])["runs"][0]["frames"][1]["moments"][0]["fixed"]
+    assert "anytime run MISSION --policy fixed --seed 3" in alone
+    beside = page_data(logs)["runs"][0]["frames"][1]["moments"][0]["fixed"]
+    assert "Fixed would have given see 700 ms and find_path 300 ms" in beside
+
+
+def test_prices_that_were_logged_name_who_pays(tmp_path, mission, floor, report):
+    with LogWriter(tmp_path / "a.jsonl") as writer:
+        writer.mission(mission, policy="expected", seed=3, labels=("see", "find_path"), floor=floor)
+        writer.frame(report.frames[0], prices={"see": 0.4, "find_path": 2.5})
+    moment = page_data([read_log(writer.path)])["runs"][0]["frames"][0]["moments"][0]
+    assert moment["price"].startswith("find_path pays most for another millisecond")
+
+
+def test_a_log_without_frames_or_map_still_makes_a_page(tmp_path, mission, report):
+    with LogWriter(tmp_path / "a.jsonl") as writer:
+        writer.mission(mission, policy="expected", seed=3, labels=("see",))
+        assert "0 frames so far" in render(read_log(writer.path))
+        writer.frame(replace(report.frames[1], index=0, story={}))
+        assert "under way" in render(read_log(writer.path))
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [360, 1400])
+def test_the_page_fits_and_answers_five_questions(browser, logs, tmp_path, width):
+    page = write_page(logs, tmp_path / "page.html")
+    browser.errors.clear()
+    browser.open(page.as_uri(), width)
+    for name in QUESTIONS:
+        answer = browser.run(f"document.getElementById('{name}').textContent")
+        assert re.search(r"\d", answer), (name, answer)
+    for frame in range(6):
+        browser.run(f"location.hash = '#{frame}'")
+        assert browser.run("document.scrollingElement.scrollWidth <= innerWidth")
+    assert browser.errors == []
+
+
+@pytest.mark.browser
+def test_it_opens_at_the_costliest_decision_and_keys_lead_on(browser, logs, tmp_path):
+    def where() -> str:
+        return browser.run("document.getElementById('where').textContent")
+
+    page = write_page(logs[:1], tmp_path / "page.html")
+    browser.errors.clear()
+    browser.open(page.as_uri())
+    assert where().startswith("Frame 2 of 5")
+    browser.press("ArrowRight")
+    assert where().startswith("Frame 3 of 5")
+    browser.press("ArrowLeft")
+    browser.press("d")
+    assert where().startswith("Frame 2 of 5")
+    assert "decision 2 of 2" in where()
+    browser.press("d")
+    assert where().startswith("Frame 3 of 5")
+    worst = [loss.index for loss in costliest(logs[0])]
+    browser.run("location.hash = '#2'")
+    browser.press("l")
+    assert where().startswith(f"Frame {worst[1]} of 5")
+    browser.open(page.as_uri() + "#4")
+    assert where().startswith("Frame 4 of 5")
+    assert browser.errors == []
+
+
+@pytest.mark.browser
+def test_a_tab_shows_another_policy(browser, logs, tmp_path):
+    browser.errors.clear()
+    browser.open(write_page(logs, tmp_path / "page.html").as_uri())
+    browser.run("document.querySelectorAll('#tabs button')[1].click()")
+    assert "min" in browser.run("document.getElementById('mission').textContent")
+    assert browser.run("location.hash").startswith("#min:")
+    assert browser.errors == []
+
+
+@pytest.fixture
+def live(tmp_path, mission, floor, report):
+    """A mission with one frame behind it, its writer, and a server of its page."""
+    with LogWriter(tmp_path / "a.jsonl") as writer:
+        writer.mission(mission, policy="expected", seed=3, labels=("see", "find_path"), floor=floor)
+        writer.frame(report.frames[0])
+        with serve(writer.path) as server:
+            thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+            thread.start()
+            yield server, writer
+            server.shutdown()
+            thread.join()
+
+
+def test_a_live_page_is_told_of_each_frame(live, report):
+    server, writer = live
+    with urllib.request.urlopen(server.url + "events", timeout=20) as events:
+        assert events.readline() == b": following\n"
+        writer.frame(report.frames[1])
+        while not (line := events.readline()).startswith(b"data: "):
+            pass
+        assert int(line[6:]) == writer.path.stat().st_size
+    with urllib.request.urlopen(server.url + "data", timeout=20) as answer:
+        assert len(json.load(answer)["runs"][0]["frames"]) == 2
+
+
+def test_only_this_machine_may_look(live):
+    server, _ = live
+    assert server.server_address[0] == "127.0.0.1"
+    asked = urllib.request.Request(server.url, headers={"Host": "evil.example"})
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(asked, timeout=20)
+
+
+def test_what_is_no_log_is_not_served(tmp_path):
+    (tmp_path / "a.jsonl").write_text("hello\n")
+    with pytest.raises(AnytimeError, match="not JSON"):
+        serve(tmp_path / "a.jsonl")
+
+
+@pytest.mark.browser
+def test_a_live_page_moves_on_with_the_mission(browser, live, report):
+    server, writer = live
+    browser.errors.clear()
+    browser.open(server.url)
+    where = "document.getElementById('where').textContent"
+    assert browser.run(where).startswith("Frame 0 of 0")
+    writer.frame(report.frames[1])
+    browser.wait(f"{where}.startsWith('Frame 1 of 1')")
+    writer.end(report)
+    browser.wait("document.getElementById('mission').textContent.includes('reached after')")
+    browser.run("stop()")
+    assert browser.errors == []
