@@ -61,7 +61,7 @@ class _Line(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=Tru
     """A line of a log; unknown fields are refused."""
 
 
-class SceneFacts(_Line):
+class SceneFacts(_Line, frozen=True):
     """The floor as logged: `rows` x `columns` cells of `step` x `step` cells of the map each.
 
     truth: base64 of the packed bits of the free cells. Places are in cells of the map.
@@ -78,7 +78,7 @@ class SceneFacts(_Line):
     truth: str
 
 
-class Box(_Line):
+class Box(_Line, frozen=True):
     """The part of the belief that changed: base64 of levels 0 … 15, two a byte, high one first."""
 
     row: int
@@ -88,7 +88,7 @@ class Box(_Line):
     levels: str
 
 
-class MomentLine(_Line):
+class MomentLine(_Line, frozen=True):
     """A decision, and the numbers behind it: see `monitor.states.Why`."""
 
     time: float
@@ -114,7 +114,7 @@ class MomentLine(_Line):
         return self.value - self.cost if self.curve else None
 
 
-class CallLine(_Line):
+class CallLine(_Line, frozen=True):
     """One call of the program in a frame: see `monitor.reports.CallRecord`."""
 
     label: str
@@ -128,7 +128,7 @@ class CallLine(_Line):
     fault: str | None
 
 
-class MissionLine(_Line, tag_field="kind", tag="mission"):
+class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
     """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed."""
 
     schema: str
@@ -151,7 +151,7 @@ class MissionLine(_Line, tag_field="kind", tag="mission"):
         return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
 
 
-class FrameLine(_Line, tag_field="kind", tag="frame"):
+class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):
     """A frame. so_far: value of completing at its end − price × energy used until then.
 
     path: cells walked. plan: (level, row, column) of the plan executed. prices: net value of one
@@ -176,7 +176,7 @@ class FrameLine(_Line, tag_field="kind", tag="frame"):
     story: dict[str, Any] = {}
 
 
-class EndLine(_Line, tag_field="kind", tag="end"):
+class EndLine(_Line, frozen=True, tag_field="kind", tag="end"):
     """The last line: see `monitor.reports.Report`."""
 
     ending: str

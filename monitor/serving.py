@@ -91,8 +91,9 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
-        self.wfile.write(b": following\n\n")
+        # The first event tells of what was written between the page and this request.
         size, silence = self._size(), 0.0
+        self.wfile.write(f"data: {size}\n\n".encode())
         while not self.server.closing.wait(LOOK):
             grown = self._size()
             silence += LOOK
