@@ -126,6 +126,7 @@ def test_the_page_fits_and_answers_five_questions(browser, logs, tmp_path, width
         assert re.search(r"\d", answer), (name, answer)
     for frame in range(6):
         browser.run(f"location.hash = '#{frame}'")
+        browser.wait(f"document.getElementById('where').textContent.startsWith('Frame {frame} ')")
         assert browser.run("document.scrollingElement.scrollWidth <= innerWidth")
     assert browser.errors == []
 
@@ -149,6 +150,7 @@ def test_it_opens_at_the_costliest_decision_and_keys_lead_on(browser, logs, tmp_
     assert where().startswith("Frame 3 of 5")
     worst = [loss.index for loss in costliest(logs[0])]
     browser.run("location.hash = '#2'")
+    browser.wait("document.getElementById('where').textContent.startsWith('Frame 2 ')")
     browser.press("l")
     assert where().startswith(f"Frame {worst[1]} of 5")
     browser.open(page.as_uri() + "#4")
