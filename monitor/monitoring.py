@@ -110,7 +110,7 @@ class _Life:
         state = State("frame", started, situation, standing, made_on, frame_started=started)
         decision = self.monitor.decide(state)
         if not self.frames:
-            self.promised = decision.why.net
+            self.promised = decision.why.net if decision.why.curve else float("nan")
         moments = [Moment(started, "frame", decision)]
         self.robot.change_speed(decision.speed)
         last_frame = not standing and situation.to_go <= 0

@@ -28,6 +28,7 @@ LEASH = 1.5  # a frame is broken off when it walks this much more than planned â
 SLACK = 8.0  # â€¦ and this many cells beyond
 IMPASSABLE = 255
 BLOCK = 2**HIGHEST_LEVEL
+NO_PLAN = np.zeros((0, 3), np.int32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,13 +147,20 @@ def _moved(plan: MultiPath, top: int, side: int) -> MultiPath:
     return replace(plan, plan=moved)
 
 
-def follow(free: NDArray[np.bool_], frame: FramePlan, start: Cell) -> Walk:
-    """Walk a frame on the true floor with what was believed when it was planned, on a leash."""
+def follow(
+    free: NDArray[np.bool_], frame: FramePlan, start: Cell, goal: Cell | None = None
+) -> Walk:
+    """Walk a frame on the true floor with what was believed when it was planned, on a leash.
+
+    goal: walk there instead, by obstacle avoidance alone and without a leash; it arrives if a way
+    exists.
+    """
     cost = travel_cost(frame.belief)
     touched = frame.belief.touched.copy()
-    return walk(
-        free, cost, touched, frame.plan.plan, start, frame.sub_goal, leash=frame.leash
-    )
+    if goal is not None:
+        return walk(free, cost, touched, NO_PLAN, start, goal)
+    plan = frame.plan.plan
+    return walk(free, cost, touched, plan, start, frame.sub_goal, leash=frame.leash)
 
 
 class FrameProblem(Protocol):
@@ -169,9 +177,9 @@ def frame_quality(frame: FramePlan | NoWay, problem: FrameProblem) -> float:
     if isinstance(frame, NoWay):
         return 0.0
     walked = follow(problem.free, frame, problem.place.start)
-    here, there = (int(c) for c in walked.cells[0]), (int(c) for c in walked.cells[-1])
-    before = astar(problem.free, tuple(here), problem.place.goal)
-    after = astar(problem.free, tuple(there), problem.place.goal)
+    row, column = (int(at) for at in walked.cells[-1])
+    before = astar(problem.free, problem.place.start, problem.place.goal)
+    after = astar(problem.free, (row, column), problem.place.goal)
     if before is None or after is None:
         return 0.0
     if walked.length == 0:

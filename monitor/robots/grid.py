@@ -20,6 +20,9 @@ from sensing import Belief
 from sensing.vision import Device, Sensor, Vision
 
 
+PATIENCE = 4  # fruitless frames after which the robot goes straight for the goal
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A floor and a way across it.
@@ -87,6 +90,7 @@ class GridRobot:
         self._speed = 1.0
         self._since = clock.now()
         self._interrupted = False
+        self._fruitless = 0  # frames in a row that touched no new cell
         self._ending: Ending | None = Ending.REACHED if scene.start == scene.goal else None
         self._to_go = self._route_from(scene.start)
 
@@ -130,7 +134,7 @@ class GridRobot:
         if isinstance(plan, NoWay):
             self._ending = Ending.UNREACHABLE
             return
-        walk = follow(self.scene.free, plan, self.cell)
+        walk = follow(self.scene.free, plan, self.cell, self._insistence(plan))
         self._plan = self._executed = plan
         self._path = walk.cells
         steps = np.abs(np.diff(walk.cells, axis=0)).sum(axis=1)
@@ -180,6 +184,13 @@ class GridRobot:
         """What is believed of the floor now: probabilities of being blocked [rows, columns]."""
         return {"belief": self.belief.probabilities()}
 
+    def _insistence(self, plan: FramePlan) -> Cell | None:
+        """Where to go without a plan, when plans led nowhere new: each frame that ends having
+        touched no new cell makes the robot surer, so that it cannot go round in circles."""
+        if not self._fruitless:
+            return None
+        return plan.sub_goal if self._fruitless < PATIENCE else self.scene.goal
+
     def _settle(self) -> None:
         """Bring place and energy up to now."""
         now = self.clock.now()
@@ -203,7 +214,10 @@ class GridRobot:
         assert plan is not None
         self._plan = None
         self.walked += float(self._along[-1])
+        known = int(self.belief.touched.sum())
         self.belief.touch_around(self._path, self.scene.free)
+        fruitful = int(self.belief.touched.sum()) > known
+        self._fruitless = 0 if fruitful else self._fruitless + 1
         self.cell = int(self._path[-1, 0]), int(self._path[-1, 1])
         self._interrupted = self.cell != plan.sub_goal
         if self.cell == self.scene.goal:
