@@ -7,7 +7,6 @@ Nothing of the machine's wall is in it (host, versions, time of day): that lies 
 from __future__ import annotations
 
 import base64
-import binascii
 import json
 import math
 import platform
@@ -20,20 +19,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from anytime.files import LARGEST, write_atomically
-from monitor.endings import Ending
-from monitor.missions import Energy, Mission, Value
+from anytime.files import write_atomically
+from monitor.log_lines import DRAWN, LEVELS, SCHEMA, Cell, Log
+from monitor.log_reading import read_log
+from monitor.missions import Mission
 from monitor.reports import Frame, Report
 
-SCHEMA = "anytime.log/1"
-LEVELS = 15  # of belief: 0 = surely free … 15 = surely blocked, so that two cells fill a byte
-DRAWN = 2**18  # cells that are logged of a map at most; a larger one is thinned out
-Cell = tuple[int, int]
+__all__ = ["Floor", "Log", "LogWriter", "plain", "read_log", "write_log", "write_wall"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,160 +51,6 @@ class Floor:
     def step(self) -> int:
         """Cells of the map along one cell of the log."""
         return max(1, math.ceil(math.sqrt(self.free.size / DRAWN)))
-
-
-class _Line(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """A line of a log; unknown fields are refused."""
-
-
-class SceneFacts(_Line, frozen=True):
-    """The floor as logged: `rows` x `columns` cells of `step` x `step` cells of the map each.
-
-    truth: base64 of the packed bits of the free cells. Places are in cells of the map.
-    """
-
-    rows: int
-    columns: int
-    step: int
-    resolution: float
-    start: Cell
-    goal: Cell
-    radius: float
-    density: float
-    truth: str
-
-
-class Box(_Line, frozen=True):
-    """The part of the belief that changed: base64 of levels 0 … 15, two a byte, high one first."""
-
-    row: int
-    column: int
-    rows: int
-    columns: int
-    levels: str
-
-
-class MomentLine(_Line, frozen=True):
-    """A decision, and the numbers behind it: see `monitor.states.Why`."""
-
-    time: float
-    moment: str
-    shares: dict[str, float]
-    speed: float
-    value: float | None
-    cost: float | None
-    seconds: float | None
-    curve: tuple[tuple[float, float | None], ...]
-    case: str
-
-    @property
-    def contract(self) -> float:
-        """The contract time t_c of the frame."""
-        return sum(self.shares.values())
-
-    @property
-    def net(self) -> float | None:
-        """The net value foreseen; None when the decision was made without foresight."""
-        if self.value is None or self.cost is None or self.seconds is None:
-            return None
-        return self.value - self.cost if self.curve else None
-
-
-class CallLine(_Line, frozen=True):
-    """One call of the program in a frame: see `monitor.reports.CallRecord`."""
-
-    label: str
-    started: float
-    elapsed: float
-    share: float
-    overrun: float
-    status: str
-    advertised: float | None
-    estimate: float | None
-    fault: str | None
-
-
-class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
-    """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed."""
-
-    schema: str
-    name: str
-    policy: str
-    seed: int
-    machine: str
-    labels: tuple[str, ...]
-    value: dict[str, float | str]
-    energy: dict[str, float]
-    speeds: tuple[float, float]
-    job: float
-    gain: float
-    scene: SceneFacts | None = None
-    fixed: dict[str, Any] | None = None
-
-    def worth(self, seconds: float) -> float:
-        """The value of completing after so many seconds."""
-        kind, worth, scale = (self.value[name] for name in ("kind", "worth", "seconds"))
-        return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
-
-
-class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):
-    """A frame. so_far: value of completing at its end − price × energy used until then.
-
-    path: cells walked. plan: (level, row, column) of the plan executed. prices: net value of one
-    more second for each call.
-    """
-
-    index: int
-    started: float
-    ended: float
-    standing: bool
-    moments: tuple[MomentLine, ...]
-    calls: tuple[CallLine, ...]
-    driven: float
-    waited: float
-    energy: float
-    interrupted: bool
-    so_far: float
-    path: tuple[Cell, ...] = ()
-    plan: tuple[tuple[int, int, int], ...] = ()
-    belief: Box | None = None
-    prices: dict[str, float | None] | None = None
-    story: dict[str, Any] = {}
-
-
-class EndLine(_Line, frozen=True, tag_field="kind", tag="end"):
-    """The last line: see `monitor.reports.Report`."""
-
-    ending: str
-    promised: float | None
-    net: float
-    earned: float
-    seconds: float
-    energy: float
-    job: float
-    ledger: dict[str, float]
-    fault: str = ""
-
-
-@dataclass(frozen=True)
-class Log:
-    """A mission as it was logged; `end` is None while it goes on or when it was cut off."""
-
-    mission: MissionLine
-    frames: tuple[FrameLine, ...] = ()
-    end: EndLine | None = None
-
-    @property
-    def promised(self) -> float | None:
-        """The net value foreseen when the task was presented."""
-        return self.frames[0].moments[0].net if self.frames else None
-
-    @property
-    def net(self) -> float | None:
-        """What the mission was really worth, or would be if it ended now."""
-        if self.end is not None:
-            return self.end.net
-        return self.frames[-1].so_far if self.frames else None
 
 
 class LogWriter:
@@ -378,7 +220,10 @@ def write_log(
     labels: tuple[str, ...] | None = None,
     fixed: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write the log of a mission that is over: the bytes that a `LogWriter` wrote during it."""
+    """Write the log of a mission that is over: the bytes of a `LogWriter` given the same frames.
+
+    What a robot shows only to those who listen (its belief) is not in a report's frames.
+    """
     if labels is None:
         shares = (frame.decision.shares for frame in report.frames)
         labels = tuple(next(shares, {}))
@@ -396,46 +241,6 @@ def write_log(
             writer.frame(frame)
         writer.end(report)
     return writer.path
-
-
-def read_log(path: Path | str) -> Log:
-    """Read a log; a torn last line, as a crash leaves it, is dropped.
-
-    Raises AnytimeError with file and line for whatever else is wrong.
-    """
-    path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST:
-            raise AnytimeError(f"{path}: {path.stat().st_size} bytes; at most {LARGEST} are read")
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise AnytimeError(f"{path}: no such file; `anytime run … --log` writes one") from None
-    except OSError as error:
-        raise AnytimeError(f"{path}: {error.strerror or error}") from None
-    # What follows the last line feed is torn or still being written.
-    lines = content.split(b"\n")[:-1]
-    mission: MissionLine | None = None
-    frames: list[FrameLine] = []
-    end: EndLine | None = None
-    for number, text in enumerate(lines, 1):
-        line = _parsed(text, f"{path}:{number}")
-        if isinstance(line, MissionLine) and mission is None:
-            mission = line
-        elif mission is None or end is not None or isinstance(line, MissionLine):
-            raise AnytimeError(f"{path}:{number}: a log is one mission, its frames and one end")
-        elif isinstance(line, EndLine):
-            end = line
-        else:
-            if line.index != len(frames):
-                raise AnytimeError(
-                    f"{path}:{number}: frame {line.index} follows {len(frames)} frames; a log "
-                    "holds every frame in order"
-                )
-            _check_frame(line, mission, f"{path}:{number}")
-            frames.append(line)
-    if mission is None:
-        raise AnytimeError(f"{path}: not a log: its first line must be the mission")
-    return Log(mission, tuple(frames), end)
 
 
 def write_wall(folder: Path) -> None:
@@ -505,75 +310,3 @@ def _thinned(grid: NDArray[Any], step: int) -> NDArray[Any]:
 
 def _text(content: NDArray[np.uint8]) -> str:
     return base64.b64encode(content.tobytes()).decode()
-
-
-def _parsed(text: bytes, where: str) -> MissionLine | FrameLine | EndLine:
-    try:
-        content = json.loads(text, object_pairs_hook=_unique, parse_constant=_refused)
-        line = msgspec.convert(content, MissionLine | FrameLine | EndLine)
-    except msgspec.ValidationError as error:
-        raise AnytimeError(f"{where}: {error}") from None
-    except json.JSONDecodeError as error:
-        raise AnytimeError(f"{where}: not JSON: {error.msg}") from None
-    except (ValueError, RecursionError) as error:
-        raise AnytimeError(f"{where}: {error}") from None
-    if isinstance(line, MissionLine):
-        _check_mission(line, where)
-    if isinstance(line, EndLine) and line.ending not in {ending.value for ending in Ending}:
-        raise AnytimeError(f"{where}: {line.ending!r} is not one of the endings")
-    return line
-
-
-def _check_mission(line: MissionLine, where: str) -> None:
-    if line.schema != SCHEMA:
-        raise AnytimeError(f"{where}: has schema {line.schema!r}, needed is {SCHEMA!r}")
-    try:
-        Value(**line.value)  # type: ignore[arg-type]
-        Energy(**line.energy)
-    except (TypeError, ValueError) as error:
-        raise AnytimeError(f"{where}: {error}") from None
-    scene = line.scene
-    if scene is not None:
-        cells = scene.rows * scene.columns
-        if min(scene.rows, scene.columns, scene.step) < 1 or cells > 4 * DRAWN:
-            raise AnytimeError(f"{where}: a scene of {scene.rows} x {scene.columns} cells")
-        _check_bytes(scene.truth, (cells + 7) // 8, f"{where}: scene.truth")
-
-
-def _check_frame(line: FrameLine, mission: MissionLine, where: str) -> None:
-    if not line.moments:
-        raise AnytimeError(f"{where}: a frame has at least one moment, its decision")
-    box = line.belief
-    if box is None:
-        return
-    scene = mission.scene
-    fits = (
-        scene is not None
-        and min(box.row, box.column) >= 0
-        and min(box.rows, box.columns) >= 1
-        and box.row + box.rows <= scene.rows
-        and box.column + box.columns <= scene.columns
-    )
-    if not fits:
-        raise AnytimeError(f"{where}: the belief's box is not within the scene")
-    _check_bytes(box.levels, (box.rows * box.columns + 1) // 2, f"{where}: belief.levels")
-
-
-def _check_bytes(text: str, count: int, where: str) -> None:
-    try:
-        found = len(base64.b64decode(text, validate=True))
-    except (binascii.Error, ValueError):
-        raise AnytimeError(f"{where} is not base64") from None
-    if found != count:
-        raise AnytimeError(f"{where} has {found} bytes; needed are {count}")
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    content = dict(pairs)
-    if len(content) != len(pairs):
-        raise ValueError("a key occurs twice in one object")
-    return content
-
-
-def _refused(name: str) -> Any:
-    raise ValueError(f"{name} is not a number that a log may hold")

@@ -11,7 +11,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 from anytime.errors import AnytimeError
-from monitor.logs import read_log
+from monitor.log_reading import read_log
 from monitor.page.rendering import page_data, render_all
 
 LOOK = 0.3  # seconds between two looks at the log's size

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from anytime.pictures import number
-from monitor.logs import CallLine, FrameLine, Log, MomentLine
+from monitor.log_lines import CallLine, FrameLine, Log, MomentLine
 from monitor.page.losses import Loss, costliest, loss_of
 
-STEP, STEP_TEXT = 0.5, "0.5 s"  # what "a little more thinking" means
+# Seconds that "a little more thinking" can mean: the longest that the numbers reach.
+STEPS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
 BAND = 0.1  # how far an estimate may lie from what its profile advertised
 
 
@@ -22,17 +24,20 @@ def headline(log: Log, frame: FrameLine, moment: MomentLine) -> str:
         return f"Nothing left to plan: {drove} {where} for {span(frame.driven)}."
     gave = _shares(moment.shares)
     did = f"Stood, gave {gave}" if frame.standing else f"Gave {gave}, {drove}"
-    more = gain(moment, STEP)
+    step = step_of(moment)
+    more, less = gain(moment, step), gain(moment, -step)
     if more is not None:
-        return f"{did}: {STEP_TEXT} more would {_change(more)}."
-    less = gain(moment, -STEP)
+        return f"{did}: {_step(step)} more would {_change(more)}."
     if less is not None:
-        return f"{did}: there was no longer contract, and {STEP_TEXT} less would {_change(less)}."
+        return f"{did}: there was no longer contract, and {_step(step)} less would {_change(less)}."
     return f"{did}: the division is fixed, nothing was weighed."
 
 
 def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
     """Why stop here?"""
+    if not frame.calls:
+        foreseen = "" if moment.net is None else f", and {number(moment.net)} was foreseen"
+        return f"0 calls were made: the plan in hand was enough{foreseen}."
     if moment.net is None or len(moment.curve) < 2:
         return (
             f"The division is fixed: {_shares(moment.shares)} in every frame, "
@@ -45,11 +50,10 @@ def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
         f"{span(peak)} promised most: a net value of {number(best)}"
         f" ({number(moment.value or 0.0)} of value − {number(moment.cost or 0.0)} of energy)"
     ]
-    moves = []
-    for step, word in ((STEP, "more"), (-STEP, "less")):
-        change = gain(moment, step)
+    moves, step = [], step_of(moment)
+    for change, word in ((gain(moment, step), "more"), (gain(moment, -step), "less")):
         if change is not None:
-            moves.append(f"{STEP_TEXT} {word} would {_change(change)}")
+            moves.append(f"{_step(step)} {word} would {_change(change)}")
     sentence = "; ".join([*parts, " and ".join(moves)] if moves else parts) + "."
     if moment.moment == "call":
         before = frame.moments[0].speed
@@ -97,22 +101,32 @@ def losses(log: Log) -> str:
     ranked = costliest(log)
     if not ranked:
         return "0 frames so far, so nothing is lost yet."
-    whole = sum(loss.total for loss in ranked)
-    worst = ranked[0]
-    waited = sum(loss.wait for loss in ranked)
-    three = sum(loss.total for loss in ranked[:3])
-    shares = f"{three / whole:.0%}" if whole > 0 else "0 %"
-    return (
-        f"In frame {worst.index}: {_loss(worst)}. The costliest {min(3, len(ranked))} of "
-        f"{len(ranked)} frames took {number(three)} of {number(whole)} ({shares}); "
-        f"standing still cost {number(waited)} in all."
+    worst = [loss for loss in ranked[:3] if loss.total > 0]
+    energy = sum(loss.energy for loss in ranked)
+    driven, waited = (sum(getattr(loss, name) for loss in ranked) for name in ("drive", "wait"))
+    parts = [f"In no frame of {len(ranked)}"]
+    if worst:
+        others = [str(loss.index) for loss in worst[1:]]
+        parts = [f"In frame {worst[0].index}: {_loss(worst[0])}"]
+        if others:
+            parts.append(f"Next come {' and '.join(others)}")
+    if all(loss.before is not None for loss in ranked):
+        whole = sum(loss.total for loss in ranked)
+        moved = "lost" if whole >= 0 else "won"
+        parts.append(f"All {len(ranked)} together {moved} {_amount(whole)}")
+    parts.append(
+        f"Driving took {_amount(driven)} of the value, standing {_amount(waited)}, "
+        f"energy {_amount(energy)}"
     )
+    return ". ".join(parts) + "."
 
 
 def here_lost(log: Log, frame: FrameLine) -> str:
     """What this frame lost."""
     rank = [loss.index for loss in costliest(log)].index(frame.index) + 1
-    return f"This frame: {_loss(loss_of(log, frame))}; the {_ordinal(rank)} costliest."
+    loss = _loss(loss_of(log, frame))
+    broken = "; it was broken off" if frame.interrupted else ""
+    return f"This frame: {loss}{broken}. The {_ordinal(rank)}costliest of {len(log.frames)}."
 
 
 def profile(log: Log) -> str:
@@ -123,15 +137,15 @@ def profile(log: Log) -> str:
         return f"Nothing was advertised for these {calls} calls, so nothing can be compared."
     apart = np.array([seen - advertised for _, advertised, seen in pairs])
     outside = int((np.abs(apart) > BAND).sum())
-    advertised, seen = (np.mean([pair[place] for pair in pairs]) for place in (1, 2))
-    share = outside / len(pairs)
-    verdict = "Yes" if share <= 0.1 else "Mostly" if share <= 0.3 else "No"
-    if verdict == "No":
-        verdict += ", it promised too much" if seen < advertised else ", it promised too little"
+    advertised, seen = (float(np.mean([pair[place] for pair in pairs])) for place in (1, 2))
+    doubt = 2.0 * float(apart.std()) / math.sqrt(len(pairs))
+    verdict = "Yes, on the mean"
+    if abs(apart.mean()) > max(doubt, 0.02):
+        verdict = f"No, it promised too {'much' if seen < advertised else 'little'}"
     return (
-        f"{verdict}: advertised {number(float(advertised))} and seen {number(float(seen))} on the "
-        f"mean of {len(pairs)} results; {outside} lay more than {number(BAND)} off, "
-        f"{int((apart < -BAND).sum())} of them below."
+        f"{verdict}: {number(advertised)} advertised, {number(seen)} ± {number(doubt)} seen in "
+        f"{len(pairs)} results; {outside} of them lay more than {number(BAND)} off, "
+        f"{int((apart < -BAND).sum())} below."
     )
 
 
@@ -175,8 +189,19 @@ def prices_of(frame: FrameLine, moment: MomentLine) -> dict[str, float | None]:
     """Net value of one more second, by call; of all together where only the curve is known."""
     if frame.prices:
         return dict(frame.prices)
-    more = gain(moment, STEP)
-    return {"thinking": None if more is None else more / STEP}
+    step = step_of(moment)
+    more = gain(moment, step)
+    return {"thinking": None if more is None else more / step}
+
+
+def step_of(moment: MomentLine) -> float:
+    """What "a little more" means for this contract, in seconds: at most half of it."""
+    steps = [step for step in STEPS if step <= 0.5 * moment.contract] or [STEPS[-1]]
+    for direction in (1, -1):
+        for step in steps:
+            if gain(moment, direction * step) is not None:
+                return step
+    return steps[0]
 
 
 def gain(moment: MomentLine, seconds: float) -> float | None:
@@ -241,8 +266,13 @@ def _change(change: float) -> str:
     return f"{'gain' if change > 0 else 'lose'} {number(abs(change))}"
 
 
+def _step(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds >= 0.1 else f"{1e3 * seconds:g} ms"
+
+
 def _rate(rate: float) -> str:
-    return f"{'gain' if rate > 0 else 'lose'} {abs(rate):.2g}"
+    size = f"{abs(rate):.2g}"
+    return f"{'gain' if rate > 0 else 'lose'} {size.removeprefix('0') if size != '0' else size}"
 
 
 def _worth(change: float) -> str:
@@ -257,10 +287,24 @@ def _loss(loss: Loss) -> str:
         ("energy", loss.energy),
     )
     shown = ", ".join(f"{number(part)} to {name}" for name, part in parts if part > 5e-4)
-    return f"{number(loss.total)} lost ({shown})" if shown else f"{number(loss.total)} lost"
+    if loss.before is None or loss.after is None:
+        return f"{number(loss.used)} used up ({shown})" if shown else f"{number(loss.used)} used up"
+    moved = "lost" if loss.total >= 0 else "won"
+    return (
+        f"{number(abs(loss.total))} {moved}, for {number(loss.before)} was foreseen before it and "
+        f"{number(loss.after)} after it"
+    )
+
+
+def _amount(value: float) -> str:
+    return "0" if abs(value) < 0.005 else number(abs(value))
 
 
 def _ordinal(rank: int) -> str:
-    if rank % 100 in (11, 12, 13):
-        return f"{rank}th"
-    return f"{rank}{ {1: 'st', 2: 'nd', 3: 'rd'}.get(rank % 10, 'th') }"
+    """What stands before "costliest"."""
+    if rank == 1:
+        return ""
+    ending = (
+        "th" if rank % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(rank % 10, "th")
+    )
+    return f"{rank}{ending} "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from monitor.logs import FrameLine, Log
+from monitor.log_lines import FrameLine, Log
 
 
 @dataclass(frozen=True)
@@ -12,16 +12,32 @@ class Loss:
     """What a frame took from the net value.
 
     drive, wait: value that ran out while the robot moved and stood. energy: price × energy used.
+    before, after: net value foreseen when it began and when the next one did (or the true one at
+    the end); None where nothing was foreseen.
     """
 
     index: int
     drive: float
     wait: float
     energy: float
+    before: float | None = None
+    after: float | None = None
+
+    @property
+    def used(self) -> float:
+        """What the frame used up, needful or not."""
+        return self.drive + self.wait + self.energy
 
     @property
     def total(self) -> float:
-        return self.drive + self.wait + self.energy
+        """By how much it fell short of what was foreseen; what it used where nothing was.
+
+        What driving takes is foreseen, so that this is bad luck and bad decisions alone; over a
+        mission it adds up to what was promised − what it was worth.
+        """
+        if self.before is None or self.after is None:
+            return self.used
+        return self.before - self.after
 
 
 @dataclass(frozen=True)
@@ -44,7 +60,12 @@ def loss_of(log: Log, frame: FrameLine) -> Loss:
     length = frame.ended - frame.started
     moved = min(max(frame.driven / length, 0.0), 1.0) if length > 0 else 0.0
     energy = log.mission.energy["price"] * frame.energy
-    return Loss(frame.index, late * moved, late * (1.0 - moved), energy)
+    before = frame.moments[0].net
+    if frame.index + 1 < len(log.frames):
+        after = log.frames[frame.index + 1].moments[0].net
+    else:
+        after = log.end.net if log.end else frame.so_far
+    return Loss(frame.index, late * moved, late * (1.0 - moved), energy, before, after)
 
 
 def waterfall(log: Log) -> list[Step]:

@@ -11,7 +11,8 @@ from typing import Any
 
 from anytime.files import write_atomically
 from anytime.pictures import duration, number
-from monitor.logs import FrameLine, Log, MomentLine, plain
+from monitor.log_lines import FrameLine, Log, MomentLine
+from monitor.logs import plain
 from monitor.page import answers
 from monitor.page.losses import costliest, loss_of, waterfall
 
@@ -22,13 +23,19 @@ def render(log: Log) -> str:
 
 
 def render_all(
-    logs: Sequence[Log], *, summary: str = "", title: str = "", live: bool = False
+    logs: Sequence[Log],
+    *,
+    names: Sequence[str] = (),
+    summary: str = "",
+    title: str = "",
+    live: bool = False,
 ) -> str:
     """One page of several missions, a tab each.
 
-    summary: trusted HTML shown above, for instance a table. live: the page listens to `events`.
+    names: of the tabs, instead of the policies. summary: trusted HTML shown above, for instance a
+    table. live: the page listens to `events`.
     """
-    data = page_data(logs)
+    data = page_data(logs, names)
     name = title or (f"{logs[0].mission.name}, seed {logs[0].mission.seed}" if logs else "replay")
     parts = {
         "title": html.escape(name),
@@ -48,17 +55,25 @@ def render_all(
 
 
 def write_page(
-    logs: Sequence[Log], path: Path | str, *, summary: str = "", title: str = ""
+    logs: Sequence[Log],
+    path: Path | str,
+    *,
+    names: Sequence[str] = (),
+    summary: str = "",
+    title: str = "",
 ) -> Path:
     """Write the page of these missions; the file is whole or absent."""
     path = Path(path)
-    write_atomically(path, render_all(logs, summary=summary, title=title).encode())
+    write_atomically(path, render_all(logs, names=names, summary=summary, title=title).encode())
     return path
 
 
-def page_data(logs: Sequence[Log]) -> dict[str, Any]:
+def page_data(logs: Sequence[Log], names: Sequence[str] = ()) -> dict[str, Any]:
     """What the page draws, as plain data: numbers, and the sentences made of them."""
-    return plain({"band": answers.BAND, "runs": [_run(log, _fixed(log, logs)) for log in logs]})
+    runs = [_run(log, _fixed(log, logs)) for log in logs]
+    for run, name in zip(runs, names, strict=False):
+        run["name"] = name
+    return plain({"band": answers.BAND, "runs": runs})
 
 
 def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -129,6 +144,7 @@ def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> di
         "driven": frame.driven,
         "so_far": frame.so_far,
         "lost": [loss.drive, loss.wait, loss.energy],
+        "fell": None if loss.before is None else loss.total,
         "here_lost": answers.here_lost(log, frame),
         "here_seen": answers.here_seen(frame),
         "path": frame.path,
@@ -173,15 +189,13 @@ def _moment(
 
 
 def _fixed(log: Log, logs: Sequence[Log]) -> Mapping[str, Any] | None:
-    """The fixed division to compare with: the log's own, or the fixed mission beside it."""
-    if log.mission.fixed:
-        return log.mission.fixed
+    """The fixed division to compare with: that of the mission beside it, or the log's own."""
     for other in logs:
         same = (other.mission.name, other.mission.seed) == (log.mission.name, log.mission.seed)
         if other is not log and same and other.mission.policy == "fixed" and other.frames:
             decision = other.frames[0].moments[0]
             return {"shares": decision.shares, "speed": decision.speed, "net": other.net}
-    return None
+    return log.mission.fixed
 
 
 def _part(name: str) -> str:

@@ -174,34 +174,40 @@ function drawLegend() {
 // ---- charts
 function drawCurve() {
   const now = frame().moments[moment], points = now.curve.filter(point => point[1] !== null);
-  if (points.length < 2) { $("curve").replaceChildren(); return; }
+  if (points.length < 2 || !frame().calls.length) { $("curve").replaceChildren(); return; }
   const height = 190, [svg, width] = picture("curve", height, "Net value against contract time");
   const left = 40, right = width - 12, top = 24, bottom = height - 36;
   const xs = points.map(point => point[0]), ys = points.map(point => point[1]);
   const reach = [...xs, now.contract, ...(run().fixed !== null ? [run().fixed] : [])];
-  const x0 = Math.min(0, ...reach), x1 = Math.max(...reach), low = Math.min(...ys), high = Math.max(...ys);
-  const pad = (high - low || 1) * .12, y0 = low - pad, y1 = high + pad;
+  const x0 = Math.min(0, ...reach), x1 = Math.max(...reach), high = Math.max(...ys);
+  // The least contracts may be a disaster; the lowest quarter is cut off so that the peak can be seen.
+  const sorted = [...ys].sort((a, b) => a - b), quarter = sorted[Math.floor(ys.length / 4)];
+  const low = high - quarter < .5 * (high - sorted[0]) ? quarter - .6 * (high - quarter) : sorted[0];
+  const pad = (high - low || 1) * .12, y0 = low - pad, y1 = high + pad * 1.6;
   const X = value => left + (right - left) * (value - x0) / (x1 - x0 || 1);
   const Y = value => bottom - (bottom - top) * (value - y0) / (y1 - y0);
-  const [rows, digits] = ticks(y0, y1, 3);
+  const [rows, digits] = ticks(y0, y1, 4);
   for (const mark of rows) {
     svg.append(make("path", {d: `M${left} ${Y(mark)}H${right}`, stroke: RULE}), text(left - 6, Y(mark) + 4, mark.toFixed(digits), {"text-anchor": "end"}));
   }
   const [columns, places] = ticks(x0, x1, width < 360 ? 4 : 6);
   for (const mark of columns) svg.append(text(X(mark), bottom + 16, `${mark.toFixed(places)}`, {"text-anchor": "middle"}));
   svg.append(text(right, height - 4, "seconds of contract", {"text-anchor": "end"}), text(0, 11, "net value foreseen"));
-  svg.append(make("polyline", {points: points.map(([a, b]) => `${X(a)},${Y(b)}`).join(" "), fill: "none", stroke: INK, "stroke-width": 1.8, "stroke-linejoin": "round"}));
-  for (const [a, b] of points) svg.append(make("circle", {cx: X(a), cy: Y(b), r: 1.8, fill: INK}));
+  const clip = make("clipPath", {id: "curve-clip"}, make("rect", {x: left, y: top, width: right - left + 4, height: bottom - top}));
+  const line = make("g", {"clip-path": "url(#curve-clip)"});
+  line.append(make("polyline", {points: points.map(([a, b]) => `${X(a)},${Y(b)}`).join(" "), fill: "none", stroke: INK, "stroke-width": 1.8, "stroke-linejoin": "round"}));
+  for (const [a, b] of points) line.append(pressable(make("circle", {cx: X(a), cy: Y(b), r: 2.2, fill: INK}), `${duration(a)}: ${number(b)}`, () => {}));
+  svg.append(clip, line);
   if (run().fixed !== null && run().fixed !== undefined) {
     svg.append(make("path", {d: `M${X(run().fixed)} ${bottom + 3}V${top + 12}`, stroke: SOFT, "stroke-dasharray": "2 3"}),
-      text(X(run().fixed), top + 8, "fixed", {"text-anchor": "middle"}));
+      text(X(run().fixed) + 4, bottom - 5, "fixed"));
   }
   const peak = points.reduce((best, point) => point[1] > best[1] ? point : best);
   svg.append(make("circle", {cx: X(peak[0]), cy: Y(peak[1]), r: 9, fill: "none", stroke: RED, "stroke-width": 1.6}));
   if (now.chosen !== null) svg.append(make("circle", {cx: X(now.contract), cy: Y(now.chosen), r: 5, fill: RED}));
   const same = Math.abs(peak[0] - now.contract) < 1e-6 + .01 * x1;
   const label = (spot, level, words) => {
-    const end = X(spot) > left + .62 * (right - left);
+    const end = X(spot) + 16 + 6.3 * words.length > right;
     svg.append(text(X(spot) + (end ? -14 : 14), Y(level) - 8, words, {class: "strong", "text-anchor": end ? "end" : "start"}));
   };
   label(peak[0], peak[1], same ? `chosen: the peak, ${duration(now.contract)}` : `peak, ${duration(peak[0])}`);
@@ -218,7 +224,7 @@ function drawShares() {
     const y = index * line + 5, share = chosen.shares[name] || 0, call = now.calls.find(each => each.label === name);
     const price = chosen.prices[name];
     svg.append(text(0, y + 13, name, {class: "strong"}));
-    svg.append(make("rect", {x: left, y, width: Math.max(1, (right - left) * share / longest), height: 16, fill: now.calls.length ? shades[name] : RULE}));
+    svg.append(make("rect", {x: left, y, width: now.calls.length ? Math.max(1, (right - left) * share / longest) : 0, height: 16, fill: shades[name]}));
     if (call) {
       const used = left + (right - left) * call.elapsed / longest;
       svg.append(pressable(make("path", {d: `M${left} ${y + 20}H${used}M${used} ${y + 16.5}V${y + 23.5}`, stroke: call.overrun > 0 ? RED : INK, "stroke-width": 1.6}), call.text, () => {}));
@@ -262,10 +268,10 @@ function drawLanes() {
     }
   });
   if (job.length) bar("job", end - it.job, end, `job ${duration(it.job)}`, it.frames.length - 1);
-  const most = Math.max(1e-9, ...seen.map(one => one.worth));
+  const most = Math.max(1e-9, ...seen.map(one => one.worth)), room = Math.min(1, (width - gutter) / it.frames.length / 11);
   for (const one of seen) {
     const current = one.index === at && one.order === moment;
-    svg.append(pressable(make("circle", {cx: X(one.time), cy: Y(one.net), r: (one.order ? 1.5 : 2) + 3.5 * Math.sqrt(one.worth / most), fill: one.order ? "#fff" : "#0072b2", stroke: current ? RED : "#0072b2", "stroke-width": current ? 2.4 : 1}),
+    svg.append(pressable(make("circle", {cx: X(one.time), cy: Y(one.net), r: 1.6 + 4 * room * Math.sqrt(one.worth / most), fill: one.order ? "#fff" : "#0072b2", stroke: current ? RED : "#0072b2", "stroke-width": current ? 2.4 : 1}),
       `frame ${one.index}, ${one.kind === "call" ? "decided again" : "decided"}: ${number(one.net)} foreseen, worth ${number(one.worth)} over the mean contract`, () => go(one.index, one.order)));
   }
   const [marks, digits] = ticks(0, end, wide ? 10 : 4);
@@ -284,29 +290,37 @@ function drawWaterfall() {
     svg.append(text(0, y + 16, names[step.name] || step.name, {class: "strong"}));
     svg.append(make("rect", {x: X(from), y: y + 4, width: Math.max(1, X(to) - X(from)), height: line - 9, fill: step.sum ? INK : shades[step.name] || RED}));
     if (index + 1 < steps.length) svg.append(make("path", {d: `M${X(step.after)} ${y + line - 5}v9`, stroke: SOFT}));
-    svg.append(text(width, y + 16, step.sum ? number(step.after) : `−${number(step.before - step.after)}`, {"text-anchor": "end", class: step.sum ? "strong" : ""}));
+    svg.append(text(width, y + 16, step.sum ? number(step.after) : step.before - step.after < .005 ? "0" : `−${number(step.before - step.after)}`, {"text-anchor": "end", class: step.sum ? "strong" : ""}));
   });
 }
 function drawFrames() {
-  const it = run(), height = 92, [svg, width] = picture("frames", height, "Loss of each frame");
-  const kinds = ["drive", "wait", "energy"], shades = fills(svg, kinds), bottom = height - 20, top = 16;
-  const most = Math.max(1e-9, ...it.frames.map(each => each.lost.reduce((a, b) => a + b)));
-  const step = width / it.frames.length, worst = it.worst.slice(0, 3);
-  svg.append(make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK}));
+  const it = run(), height = 112, [svg, width] = picture("frames", height, "Loss of each frame");
+  const kinds = ["drive", "wait", "energy"], shades = fills(svg, kinds), top = 16;
+  // Where net value was foreseen: how it fell (▼, down, red) or rose over each frame; else what was used up.
+  const foreseen = it.frames.every(each => each.fell !== null), falls = it.frames.map(each => each.fell);
+  const sizes = foreseen ? falls : it.frames.map(each => each.lost.reduce((a, b) => a + b));
+  const rise = foreseen ? Math.max(0, ...falls.map(fall => -fall)) : 0, fall = Math.max(0, ...sizes), room = height - 36;
+  const unit = room / (rise + fall || 1), most = fall || 1e-9;
+  const bottom = foreseen ? top / 4 + rise * unit : height - 20;
+  const step = width / it.frames.length, worst = it.worst.slice(0, 3).filter(index => sizes[index] > 0);
+  const base = make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK});
   it.frames.forEach((each, index) => {
     let up = bottom;
     const group = make("g");
-    if (index === at) group.append(make("rect", {x: index * step, y: 0, width: step, height: bottom, fill: "#fbe9c6"}));
-    else group.append(make("rect", {x: index * step, y: 0, width: step, height: bottom, fill: "transparent"}));
-    each.lost.forEach((part, kind) => {
+    if (index === at) group.append(make("rect", {x: index * step, y: 0, width: step, height: height - 20, fill: "#fbe9c6"}));
+    else group.append(make("rect", {x: index * step, y: 0, width: step, height: height - 20, fill: "transparent"}));
+    if (foreseen) {
+      const down = each.fell > 0, tall = Math.abs(each.fell) * unit;
+      group.append(make("rect", {x: index * step + step * .14, y: down ? bottom : bottom - tall, width: Math.max(1, step * .72), height: tall, fill: down ? RED : "#fff", stroke: down ? RED : "#0072b2"}));
+    } else each.lost.forEach((part, kind) => {
       const tall = Math.max(0, (bottom - top) * part / most);
       up -= tall;
       group.append(make("rect", {x: index * step + step * .12, y: up, width: Math.max(1, step * .76), height: tall, fill: shades[kinds[kind]]}));
     });
-    if (worst.includes(index)) group.append(text((index + .5) * step, up - 4, index, {"text-anchor": "middle", class: "strong"}));
+    if (worst.includes(index)) group.append(text((index + .5) * step, foreseen ? Math.min(height - 22, bottom + Math.max(0, each.fell) * unit + 13) : up - 4, index, {"text-anchor": "middle", class: "strong"}));
     svg.append(pressable(group, each.here_lost, () => go(index)));
   });
-  svg.append(text(0, height - 5, "lost, frame by frame"), text(width, height - 5, "the three worst are numbered", {"text-anchor": "end"}));
+  svg.append(base, text(0, height - 4, foreseen ? "net value foreseen: ■ lost, □ won in each frame" : "used up, frame by frame"));
 }
 function drawSeen() {
   const points = run().compared;

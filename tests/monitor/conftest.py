@@ -29,10 +29,10 @@ def made_up_report(frames: int = 6, policy: str = "expected", seed: int = 3) -> 
         started, ended = 2.0 * index, 2.0 * index + 2.0
         belief = belief.copy()
         belief[rng.integers(12), rng.integers(15)] = rng.random()
-        curve = tuple((0.4 + 0.2 * step, 60.0 - (step - 3.0) ** 2 - index) for step in range(8))
-        decision = Decision(
-            {"see": 0.7, "find_path": 0.3}, 4.0, Why(70.0 - index, 10.0, 20.0, curve, "inter-frame")
-        )
+        foreseen = 60.0 - 4.0 * (index > 2)  # frame 2 goes wrong
+        curve = tuple((0.4 + 0.2 * step, foreseen - (step - 3.0) ** 2) for step in range(8))
+        why = Why(foreseen + 10.0, 10.0, 20.0, curve, "inter-frame")
+        decision = Decision({"see": 0.7, "find_path": 0.3}, 4.0, why)
         again = Moment(started + 1.0, "call", Decision(decision.shares, 5.0, decision.why))
         calls = (
             CallRecord("see", started, 0.7, 0.7, 0.0, "interrupted", None, 0.9, None),

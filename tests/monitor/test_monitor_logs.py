@@ -13,7 +13,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from anytime.errors import AnytimeError
-from monitor.logs import LEVELS, Floor, LogWriter, plain, read_log, write_log
+from monitor.log_lines import LEVELS
+from monitor.logs import Floor, LogWriter, plain, read_log, write_log
 
 
 def test_a_log_holds_what_the_report_held(tmp_path, mission, floor, report):

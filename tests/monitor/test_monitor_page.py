@@ -11,6 +11,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import pytest
+from msgspec.structs import replace as replace_struct
 
 from anytime.errors import AnytimeError
 from monitor.endings import Ending
@@ -71,8 +72,27 @@ def test_a_mission_that_was_not_reached_earns_nothing(tmp_path, mission, floor, 
     assert steps["net"].after == pytest.approx(told.net)
 
 
-def test_the_costliest_frame_is_the_one_that_used_more_energy(logs):
-    assert costliest(logs[0])[0].index == 2
+def test_what_the_frames_lost_is_what_was_promised_and_not_kept(logs):
+    for log in logs:
+        lost = sum(loss.total for loss in costliest(log))
+        assert lost == pytest.approx(log.promised - log.net)
+
+
+def test_the_costliest_frame_is_the_one_after_which_least_was_foreseen(logs):
+    log = logs[0]
+    assert costliest(log)[0].index == 2
+    assert costliest(log)[0].total == pytest.approx(4.0)
+
+
+def test_without_foresight_the_costliest_frame_used_up_most(logs):
+    moments = [replace_struct(frame.moments[0], curve=()) for frame in logs[0].frames]
+    frames = [
+        replace_struct(frame, moments=(moment,))
+        for frame, moment in zip(logs[0].frames, moments, strict=True)
+    ]
+    worst = costliest(replace(logs[0], frames=tuple(frames)))[0]
+    assert worst.index == 2
+    assert worst.total == worst.used
 
 
 def test_each_question_is_answered_with_a_number(logs):

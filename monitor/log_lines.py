@@ -1,0 +1,169 @@
+"""What the lines of a mission's log hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+
+from monitor.missions import Value
+
+SCHEMA = "anytime.log/1"
+LEVELS = 15  # of belief: 0 = surely free … 15 = surely blocked, so that two cells fill a byte
+DRAWN = 2**18  # cells that are logged of a map at most; a larger one is thinned out
+Cell = tuple[int, int]
+
+
+class _Line(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
+    """A line of a log; unknown fields are refused."""
+
+
+class SceneFacts(_Line, frozen=True):
+    """The floor as logged: `rows` x `columns` cells of `step` x `step` cells of the map each.
+
+    truth: base64 of the packed bits of the free cells. Places are in cells of the map.
+    """
+
+    rows: int
+    columns: int
+    step: int
+    resolution: float
+    start: Cell
+    goal: Cell
+    radius: float
+    density: float
+    truth: str
+
+
+class Box(_Line, frozen=True):
+    """The part of the belief that changed: base64 of levels 0 … 15, two a byte, high one first."""
+
+    row: int
+    column: int
+    rows: int
+    columns: int
+    levels: str
+
+
+class MomentLine(_Line, frozen=True):
+    """A decision, and the numbers behind it: see `monitor.states.Why`."""
+
+    time: float
+    moment: str
+    shares: dict[str, float]
+    speed: float
+    value: float | None
+    cost: float | None
+    seconds: float | None
+    curve: tuple[tuple[float, float | None], ...]
+    case: str
+
+    @property
+    def contract(self) -> float:
+        """The contract time t_c of the frame."""
+        return sum(self.shares.values())
+
+    @property
+    def net(self) -> float | None:
+        """The net value foreseen; None when the decision was made without foresight."""
+        if self.value is None or self.cost is None or self.seconds is None:
+            return None
+        return self.value - self.cost if self.curve else None
+
+
+class CallLine(_Line, frozen=True):
+    """One call of the program in a frame: see `monitor.reports.CallRecord`."""
+
+    label: str
+    started: float
+    elapsed: float
+    share: float
+    overrun: float
+    status: str
+    advertised: float | None
+    estimate: float | None
+    fault: str | None
+
+
+class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
+    """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed."""
+
+    schema: str
+    name: str
+    policy: str
+    seed: int
+    machine: str
+    labels: tuple[str, ...]
+    value: dict[str, float | str]
+    energy: dict[str, float]
+    speeds: tuple[float, float]
+    job: float
+    gain: float
+    scene: SceneFacts | None = None
+    fixed: dict[str, Any] | None = None
+
+    def worth(self, seconds: float) -> float:
+        """The value of completing after so many seconds."""
+        kind, worth, scale = (self.value[name] for name in ("kind", "worth", "seconds"))
+        return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
+
+
+class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):
+    """A frame. so_far: value of completing at its end − price × energy used until then.
+
+    path: cells walked. plan: (level, row, column) of the plan executed. prices: net value of one
+    more second for each call.
+    """
+
+    index: int
+    started: float
+    ended: float
+    standing: bool
+    moments: tuple[MomentLine, ...]
+    calls: tuple[CallLine, ...]
+    driven: float
+    waited: float
+    energy: float
+    interrupted: bool
+    so_far: float
+    path: tuple[Cell, ...] = ()
+    plan: tuple[tuple[int, int, int], ...] = ()
+    belief: Box | None = None
+    prices: dict[str, float | None] | None = None
+    story: dict[str, Any] = {}
+
+
+class EndLine(_Line, frozen=True, tag_field="kind", tag="end"):
+    """The last line: see `monitor.reports.Report`."""
+
+    ending: str
+    promised: float | None
+    net: float
+    earned: float
+    seconds: float
+    energy: float
+    job: float
+    ledger: dict[str, float]
+    fault: str = ""
+
+
+@dataclass(frozen=True)
+class Log:
+    """A mission as it was logged; `end` is None while it goes on or when it was cut off."""
+
+    mission: MissionLine
+    frames: tuple[FrameLine, ...] = ()
+    end: EndLine | None = None
+
+    @property
+    def promised(self) -> float | None:
+        """The net value foreseen when the task was presented."""
+        return self.frames[0].moments[0].net if self.frames else None
+
+    @property
+    def net(self) -> float | None:
+        """What the mission was really worth, or would be if it ended now."""
+        if self.end is not None:
+            return self.end.net
+        return self.frames[-1].so_far if self.frames else None
