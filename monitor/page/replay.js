@@ -178,8 +178,9 @@ function drawCurve() {
   const height = 190, [svg, width] = picture("curve", height, "Net value against contract time");
   const left = 40, right = width - 12, top = 24, bottom = height - 36;
   const xs = points.map(point => point[0]), ys = points.map(point => point[1]);
-  const reach = [...xs, now.contract, ...(run().fixed !== null ? [run().fixed] : [])];
-  const x0 = Math.min(0, ...reach), x1 = Math.max(...reach), high = Math.max(...ys);
+  const fixed = run().fixed ?? null, least = Math.min(...xs), most = Math.max(...xs);
+  const narrow = least > .5 * most;  // contracts that differ little fill the chart; others begin at 0
+  const x0 = narrow ? least - .06 * (most - least) : 0, x1 = Math.max(most, now.contract), high = Math.max(...ys);
   // The least contracts may be a disaster; the lowest quarter is cut off so that the peak can be seen.
   const sorted = [...ys].sort((a, b) => a - b), quarter = sorted[Math.floor(ys.length / 4)];
   const low = high - quarter < .5 * (high - sorted[0]) ? quarter - .6 * (high - quarter) : sorted[0];
@@ -198,9 +199,12 @@ function drawCurve() {
   line.append(make("polyline", {points: points.map(([a, b]) => `${X(a)},${Y(b)}`).join(" "), fill: "none", stroke: INK, "stroke-width": 1.8, "stroke-linejoin": "round"}));
   for (const [a, b] of points) line.append(pressable(make("circle", {cx: X(a), cy: Y(b), r: 2.2, fill: INK}), `${duration(a)}: ${number(b)}`, () => {}));
   svg.append(clip, line);
-  if (run().fixed !== null && run().fixed !== undefined) {
-    svg.append(make("path", {d: `M${X(run().fixed)} ${bottom + 3}V${top + 12}`, stroke: SOFT, "stroke-dasharray": "2 3"}),
-      text(X(run().fixed) + 4, bottom - 5, "fixed"));
+  if (fixed !== null && fixed >= x0 && fixed <= x1) {
+    svg.append(make("path", {d: `M${X(fixed)} ${bottom + 3}V${top + 12}`, stroke: SOFT, "stroke-dasharray": "2 3"}),
+      text(X(fixed) + 4, bottom - 5, "fixed"));
+  } else if (fixed !== null) {
+    const before = fixed < x0;
+    svg.append(text(before ? left + 4 : right, bottom - 5, before ? `← fixed, ${duration(fixed)}` : `fixed, ${duration(fixed)} →`, {"text-anchor": before ? "start" : "end"}));
   }
   const peak = points.reduce((best, point) => point[1] > best[1] ? point : best);
   svg.append(make("circle", {cx: X(peak[0]), cy: Y(peak[1]), r: 9, fill: "none", stroke: RED, "stroke-width": 1.6}));
@@ -244,7 +248,8 @@ function drawLanes() {
   svg.append(make("rect", {x: X(now.started), y: 0, width: Math.max(2, X(now.ended) - X(now.started)), height: height - 20, fill: "#fbe9c6"}));
   const values = it.frames.flatMap(each => [each.so_far, ...each.moments.map(one => one.net)]).filter(value => value !== null);
   const low = Math.min(...values), high = Math.max(...values), Y = value => tall - 12 - (tall - 26) * (value - low) / (high - low || 1);
-  svg.append(text(0, 22, "net value"), text(0, 37, "foreseen ●"), text(0, 52, "so far –"));
+  const foreseen = it.frames.some(each => each.moments[0].net !== null);
+  svg.append(text(0, 22, "net value"), text(0, 37, "so far –"), text(0, 52, foreseen ? "foreseen ●" : ""));
   svg.append(make("polyline", {points: it.frames.map(each => `${X(each.ended)},${Y(each.so_far)}`).join(" "), fill: "none", stroke: SOFT, "stroke-dasharray": "4 3"}));
   const seen = it.frames.flatMap((each, index) => each.moments.map((one, order) => ({...one, index, order}))).filter(one => one.net !== null);
   svg.append(make("polyline", {points: seen.filter(one => !one.order).map(one => `${X(one.time)},${Y(one.net)}`).join(" "), fill: "none", stroke: "#0072b2", "stroke-width": 1.2, opacity: .7}));
@@ -327,7 +332,7 @@ function drawSeen() {
   if (!points.length) { $("seen").replaceChildren(); return; }
   const height = 190, [svg, width] = picture("seen", height, "Advertised and seen quality by frame");
   const left = 30, right = width - 8, top = 24, bottom = height - 32;
-  const last = Math.max(1, run().frames.length - 1), X = index => left + (right - left) * index / last, Y = value => bottom - (bottom - top) * value;
+  const last = Math.max(1, run().frames.length - 1), X = index => left + 9 + (right - left - 9) * index / last, Y = value => bottom - (bottom - top) * value;
   for (const mark of [0, .5, 1]) svg.append(make("path", {d: `M${left} ${Y(mark)}H${right}`, stroke: RULE}), text(left - 6, Y(mark) + 4, number(mark).replace("0.00", "0").replace("1.00", "1"), {"text-anchor": "end"}));
   const clip = value => Math.min(1, Math.max(0, value));
   const over = points.map(([index, level]) => `${X(index)},${Y(clip(level + data.band))}`), under = points.map(([index, level]) => `${X(index)},${Y(clip(level - data.band))}`).reverse();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import socket
 import threading
 import urllib.error
 import urllib.request
@@ -211,6 +212,16 @@ def test_a_live_page_is_told_of_each_frame(live, report):
         assert int(events.readline()[6:]) == writer.path.stat().st_size
     with urllib.request.urlopen(server.url + "data", timeout=20) as answer:
         assert len(json.load(answer)["runs"][0]["frames"]) == 2
+
+
+def test_a_viewer_that_never_reads_holds_nobody(live, report):
+    server, writer = live
+    with socket.create_connection(server.server_address, timeout=20) as dead:
+        dead.sendall(b"GET /events HTTP/1.0\r\nHost: 127.0.0.1:1\r\n\r\n")
+        for frame in report.frames[1:]:
+            writer.frame(frame)
+        with urllib.request.urlopen(server.url + "data", timeout=20) as answer:
+            assert len(json.load(answer)["runs"][0]["frames"]) == len(report.frames)
 
 
 def test_only_this_machine_may_look(live):
