@@ -55,7 +55,8 @@ class WorkClock:
         return self._now
 
     def spend(self, module: str, work: float, step: int | None) -> None:
-        self._now += self.machine.seconds(module, work, step)
+        if work:  # nothing costs nothing, for a module without a rate as well
+            self._now += self.machine.seconds(module, work, step)
 
     def advance(self, seconds: float) -> None:
         """Let `seconds` pass. Raises AnytimeError for a negative or non-finite time."""

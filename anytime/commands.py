@@ -45,9 +45,7 @@ def profile(options: argparse.Namespace) -> Answer:
         if not isinstance(what, Module | Program):
             raise AnytimeError(f"{reference} is {type(what).__name__}, not a module or program")
         source = resolve(options.problems) if options.problems else _problems(what)
-        problems = list(
-            itertools.islice(source(np.random.default_rng(options.seed)), options.runs)
-        )
+        problems = list(itertools.islice(source(np.random.default_rng(options.seed)), options.runs))
         with progress(f"measuring {what.name}") as report:
             measured = measure(
                 what, problems, seconds=options.seconds, seed=options.seed, progress=report

@@ -6,4 +6,4 @@ class AnytimeError(ValueError):
 
 
 class OutsideRunError(RuntimeError):
-    """`register`, `expired` or `charge` was called where no module runs, or after its run closed."""
+    """`register`, `expired` or `charge` was called where no module runs, or after its run."""

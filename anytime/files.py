@@ -16,6 +16,7 @@ import msgspec
 from anytime.errors import AnytimeError
 
 LARGEST = 256 * 2**20  # bytes of a file that we are ready to parse
+DEEPEST = 32  # lists and objects inside one another
 
 
 class Stored(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -74,8 +75,8 @@ def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
     del content["schema"]
     try:
         return msgspec.convert(content, kind)
-    except msgspec.ValidationError as error:
-        raise AnytimeError(f"{path}: {error}") from None
+    except (msgspec.ValidationError, OverflowError) as error:
+        raise AnytimeError(f"{path}: {' '.join(str(error).split())}") from None
 
 
 def read_json(path: Path) -> Any:
@@ -136,12 +137,14 @@ def _refuse_constant(name: str) -> NoReturn:
     raise ValueError(f"{name} is not a number that a file may hold")
 
 
-def _refuse_non_finite(value: Any, where: str, path: Path) -> None:
+def _refuse_non_finite(value: Any, where: str, path: Path, depth: int = 0) -> None:
+    if depth > DEEPEST:
+        raise AnytimeError(f"{path}: nested too deeply; our files nest at most {DEEPEST} deep")
     if isinstance(value, float) and not math.isfinite(value):
         raise AnytimeError(f"{path}: {where} is {value}; numbers must be finite")
     if isinstance(value, dict):
         for key, item in value.items():
-            _refuse_non_finite(item, f"{where}.{key}", path)
+            _refuse_non_finite(item, f"{where}.{key}", path, depth + 1)
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            _refuse_non_finite(item, f"{where}[{index}]", path)
+            _refuse_non_finite(item, f"{where}[{index}]", path, depth + 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -177,7 +178,7 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     if run.estimates is not None and len(run.estimates) != count:
         raise refuse("estimates and seconds differ in length")
     for name, column in (("seconds", run.seconds), ("work", run.work)):
-        if any(b < a for a, b in zip(column, column[1:], strict=False)) or (
+        if any(b < a for a, b in pairwise(column)) or (
             column and column[0] < 0
         ):
             raise refuse(f"{name} must not decrease or be negative")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -118,7 +119,7 @@ def _sample(
         )
     if result.fault and not kept:
         raise AnytimeError(
-            f"module {module.name!r} failed on problem {key} before its first result: {result.fault}"
+            f"module {module.name!r} failed on problem {key} before any result: {result.fault}"
         )
     if len(kept) > CHANGES:
         chosen = np.unique(np.linspace(0, len(kept) - 1, CHANGES).round().astype(int))
@@ -200,7 +201,10 @@ def _library(
         for key, runs in samples[call.label].items():
             costs = [float(cost) for run in runs for cost in run.raw if cost > 0]
             if costs:
-                best[key] = min([*costs, best.get(key, float("inf"))])
+                best[key] = min([*costs, best.get(key, math.inf)])
+    for best in references.values():
+        for key in keys:  # where every cost is 0, or nothing arrived, any reference will do
+            best.setdefault(key, 1.0)
 
     def quality(source: Call, key: str, sample: _Sample, index: int) -> float:
         raw = float(sample.raw[index])
@@ -221,13 +225,19 @@ def _library(
         name = call.module.name
         known = profiles.get(name)
         if known is not None and recordings:
+            if set(known.inputs) != set(feeding):
+                raise AnytimeError(
+                    f"program {program.name!r} calls {name} in two ways, fed by other modules at "
+                    f"({', '.join(known.inputs)}) and at ({', '.join(feeding)}); give one of them "
+                    "a module of its own"
+                )
             profiles[name] = replace(known, recordings=(*known.recordings, *recordings))
         elif recordings:
-            best = {k: v for k, v in references.get(name, {}).items()}
-            profiles[name] = Profile(
-                name, tuple(feeding), tuple(recordings), best, machine.name if machine else "this"
-            )
-        rates[name] = _rate([run for runs in samples[call.label].values() for run in runs])
+            best = references.get(name, {})
+            here = machine.name if machine else "this"
+            profiles[name] = Profile(name, tuple(feeding), tuple(recordings), best, here)
+        same = [other.label for other in program.calls if other.module is call.module]
+        rates[name] = _rate([run for at in same for runs in samples[at].values() for run in runs])
     return ProfileLibrary(profiles=profiles, machine=machine or Machine("this", rates))
 
 
@@ -275,8 +285,8 @@ def _keys(program: Program, problems: Sequence[Any]) -> list[str]:
             )
         name = getattr(problem, "name", None)
         key = name if isinstance(name, str) else _digest(program, problem)
-        count = sum(known == key or known.startswith(f"{key}#") for known in keys)
-        keys.append(key if not count else f"{key}#{count + 1}")
+        numbered = (f"{key}#{count}" for count in itertools.count(2))
+        keys.append(key if key not in keys else next(k for k in numbered if k not in keys))
     return keys
 
 

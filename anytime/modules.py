@@ -50,7 +50,7 @@ class Module:
         function = self.quality or self.cost
         if function is None:
             raise AnytimeError(
-                f"module {self.name!r} cannot be scored; give @anytime.module(quality=…) or (cost=…)"
+                f"module {self.name!r} cannot be scored; give @anytime.module(quality=…) or cost=…"
             )
         return function(result, problem) if _takes_two(function) else function(result)
 

@@ -60,8 +60,14 @@ class Distribution:
         return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())
 
     def quantile(self, share: float) -> float:
-        """The quality that a share of the runs stays below; NaN where that is no result."""
+        """The quality that a share of the runs stays below; NaN where that is no result.
+
+        Raises AnytimeError for a share outside [0, 1].
+        """
+        if not 0 <= share <= 1:
+            raise AnytimeError(f"a share of {share} of the runs; give one in [0, 1]")
         order = np.argsort(np.nan_to_num(self.values, nan=-1.0), kind="stable")
+        order = order[self.weights[order] > 0]
         cumulative = np.cumsum(self.weights[order])
         index = min(int(np.searchsorted(cumulative, share - 1e-12)), len(order) - 1)
         return float(self.values[order[index]])
@@ -87,7 +93,7 @@ class Profile:
     def __post_init__(self) -> None:
         if not self.recordings:
             raise AnytimeError(
-                f"profile of {self.module!r} has no recorded run; measure it on at least one problem"
+                f"profile of {self.module!r} has no recorded run; measure at least one problem"
             )
         for name in self.condition:
             known = (*self.inputs, *self.features)
@@ -152,7 +158,7 @@ class Profile:
                 continue
             values = np.array([run.features.get(name, np.nan) for run in self.recordings])
             width = max(float(np.nanstd(values)) * len(self.problems) ** -0.2, 1e-9)
-            own = self.recordings[members[0]].features.get(name, np.nan)
+            own = self.recordings[members[0]].features.get(name, np.inf)
             weight *= float(np.exp(-0.5 * ((own - self.condition[name]) / width) ** 2)) + 1e-9
         return weight
 
@@ -185,6 +191,8 @@ class Profile:
         for name, value in condition.items():
             if name in self.inputs and not 0 <= value <= 1:
                 raise AnytimeError(f"given({name}={value}): a quality lies in [0, 1]")
+            if not np.isfinite(value):
+                raise AnytimeError(f"given({name}={value}): give a finite number")
         return replace(self, condition={**self.condition, **condition})
 
     def at(self, seconds: float) -> Distribution:
@@ -197,12 +205,20 @@ class Profile:
         The monotone envelope (the best expectation with that time or less), or as measured.
         """
         times = np.atleast_1d(np.asarray(seconds, dtype=float))
-        measured = self.weights @ np.nan_to_num(self.quality_at(times))
-        if as_measured:
-            return measured
-        knots = np.maximum.accumulate(self.weights @ np.nan_to_num(self.quality_at(self.times)))
-        before = np.searchsorted(self.times, times, side="right") - 1
-        return np.maximum(measured, np.where(before >= 0, knots[np.maximum(before, 0)], 0.0))
+        changes, measured = self._course
+        known = measured if as_measured else np.maximum.accumulate(measured)
+        return known[np.searchsorted(changes, times, side="right")]
+
+    @cached_property
+    def _course(self) -> tuple[Floats, Floats]:
+        """The mean as measured, as a step function: every time at which it changes [n],
+        increasing, and the mean before the first and from each of them on, [n + 1]."""
+        steps = [np.diff(values, prepend=0.0) for values in self.qualities]
+        moments = np.concatenate([run.seconds for run in self.recordings])
+        gains = np.concatenate([w * step for w, step in zip(self.weights, steps, strict=True)])
+        changes, place = np.unique(moments, return_inverse=True)
+        gained = np.bincount(place, weights=gains, minlength=len(changes))
+        return changes, np.clip(np.concatenate([[0.0], np.cumsum(gained)]), 0.0, 1.0)
 
     def quantile(self, share: float, seconds: float) -> float:
         """The quality that a share of the runs stays below; NaN where that is no result."""
@@ -223,6 +239,8 @@ class Profile:
         """
         starts: list[tuple[float, float, float]] = []
         for weight, run, values in zip(self.weights, self.recordings, self.qualities, strict=True):
+            if weight <= 0:
+                continue
             for moment, value in zip(run.seconds, values, strict=True):
                 index = int(np.searchsorted(run.seconds, moment + seconds, side="right")) - 1
                 starts.append((abs(value - quality), weight / len(values), values[index]))
@@ -264,7 +282,10 @@ class Profile:
         sampled = (draws @ per_problem) / total[:, None]
         spread = sampled.std(axis=0) + 1e-9
         factor = float(np.quantile(np.max(np.abs(sampled - mean) / spread, axis=1), confidence))
-        return np.clip(mean - factor * spread, 0, 1), np.clip(mean + factor * spread, 0, 1)
+        # The envelope that `mean` gives lies above the mean as measured where quality falls.
+        envelope = np.maximum(self.mean(times), mean)
+        low, high = mean - factor * spread, np.maximum(mean + factor * spread, envelope)
+        return np.clip(low, 0, 1), np.clip(high, 0, 1)
 
     def on(self, machine: Machine) -> Profile:
         """This profile in the seconds of another machine: quality over work stays as it is."""
@@ -288,7 +309,7 @@ class Profile:
         means = self.mean(times)
         first = self.time_to(1e-9)
         parts = [
-            f"{self.module}  {sparkline(means)}  q {number(float(means[-1]))} "
+            f"{self.module}  {sparkline(means.tolist())}  q {number(float(means[-1]))} "
             f"in {duration(self._horizon())}, first {duration(first)}"
         ]
         if self.condition:

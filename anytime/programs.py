@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -22,9 +23,19 @@ class Reading:
         self.calls: list[Call] = []
 
     def call(self, module: Module, arguments: tuple[object, ...]) -> Call:
-        """A new call; plain arguments become constants, the label is numbered when it repeats."""
-        same = sum(call.module is module for call in self.calls)
-        label = module.name if not same else f"{module.name}_{same + 1}"
+        """A new call; plain arguments become constants, the label is numbered when it repeats.
+
+        Raises AnytimeError for two modules of one name: profiles are kept by name.
+        """
+        if any(c.module.name == module.name and c.module is not module for c in self.calls):
+            raise AnytimeError(
+                f"two different modules are named {module.name!r}; give one @anytime.module(name=…)"
+            )
+        taken = {call.label for call in self.calls}
+        numbered = (f"{module.name}_{count}" for count in itertools.count(2))
+        label = (
+            module.name if module.name not in taken else next(n for n in numbered if n not in taken)
+        )
         nodes = tuple(a if isinstance(a, _Symbol) else Constant(a) for a in arguments)
         made = Call(module, nodes, label)  # pyright: ignore[reportArgumentType]
         self.calls.append(made)
@@ -80,11 +91,21 @@ class _Symbol:
     def __call__(self, *_: object, **__: object) -> NoReturn:
         self._refuse("calls", "only modules can be called in a program")
 
-    def __add__(self, other: object) -> NoReturn:
+    def __add__(self, *_: object) -> NoReturn:
         self._refuse("computes with", "do it inside a module")
 
     __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = __add__
-    __lt__ = __gt__ = __le__ = __ge__ = __neg__ = __add__  # pyright: ignore
+    __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __pow__ = __rpow__ = __add__
+    __matmul__ = __rmatmul__ = __neg__ = __pos__ = __abs__ = __add__
+    __lt__ = __gt__ = __le__ = __ge__ = __add__  # pyright: ignore
+    __len__ = __contains__ = __float__ = __int__ = __add__
+
+    def __eq__(self, other: object) -> bool:
+        if self is not other and being_read() is not None:
+            self._refuse("compares", "use compiler.branch(test, then, otherwise)")
+        return self is other
+
+    __hash__ = object.__hash__
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +152,12 @@ class Program:
     inputs: tuple[str, ...]
     calls: tuple[Call, ...]
     output: Call
+
+    def __call__(self, *_: object, **__: object) -> NoReturn:
+        raise AnytimeError(
+            f"{self.name} is a program: compile it, schedule = compiler.compile({self.name}, "
+            "library), then schedule.run(seconds=…, …), or call the schedule in another program"
+        )
 
     def __repr__(self) -> str:
         return f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"

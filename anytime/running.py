@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import traceback
 from collections.abc import Callable, Mapping
 from contextvars import ContextVar
@@ -66,7 +67,7 @@ class Result:
     overrun: float
     history: tuple[Change, ...]
     work: float = 0.0
-    parts: Mapping[str, Result] = field(default_factory=dict)
+    parts: Mapping[str, Result] = field(default_factory=dict[str, Any])
     why: str = ""
 
     def __bool__(self) -> bool:
@@ -121,8 +122,10 @@ class Run:
     def charge(self, work: float) -> None:
         """Count `work` units; from then on checks are free."""
         self._open()
-        if not work >= 0:
-            raise AnytimeError(f"module {self.module.name!r} charged {work}; give a number >= 0")
+        if not 0 <= work < math.inf:
+            raise AnytimeError(
+                f"module {self.module.name!r} charged {work}; give a finite number >= 0"
+            )
         self.mixed = self.mixed or (self._steps > 0 and not self.charges)
         self.charges = True
         self.work += work
@@ -143,6 +146,8 @@ class Run:
         """Keep a result; it replaces the last."""
         estimate = self.module.estimate
         seen = None if estimate is None else float(estimate(value))
+        if seen is not None and not 0 <= seen <= 1:
+            raise AnytimeError(f"estimate of {self.module.name!r} is {seen}; it must lie in [0, 1]")
         change = Change(self.deadline.clock.now() - self.started, self.work, seen)
         self.value = value
         self.history.append(change)
@@ -245,6 +250,8 @@ def run(
     module's name. What the module raises becomes `Result.fault`.
     Raises AnytimeError for inputs that do not fit the module.
     """
+    if not isinstance(module, Module):
+        raise AnytimeError(f"{module!r} is not a module; decorate it with @anytime.module(…)")
     if (seconds is None) == (deadline is None):
         raise AnytimeError(f"give seconds=… or deadline=… to run {module.name!r}, one of them")
     outer = _current.get()

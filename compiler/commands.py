@@ -12,7 +12,9 @@ from anytime.errors import AnytimeError
 
 def declare(commands: Any) -> None:
     """Declare the sub-commands."""
-    parser = add_command(commands, "compile", compile_program, "divide time among a program's modules")
+    parser = add_command(
+        commands, "compile", compile_program, "divide time among a program's modules"
+    )
     parser.add_argument("program", help="a registered name or FILE.py:NAME")
     parser.add_argument("--library", type=Path, default=Path("profiles"), metavar="DIR")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default NAME.schedule")
@@ -37,7 +39,9 @@ def compile_program(options: argparse.Namespace) -> Answer:
     compiled = compile(program, ProfileLibrary(options.library))
     target: Path = options.output or Path(f"{compiled.name}.schedule")
     compiled.save(target)
-    return Answer(f"{compiled!r}\nwritten to {target}", {"file": str(target), "least": compiled.least})
+    return Answer(
+        f"{compiled!r}\nwritten to {target}", {"file": str(target), "least": compiled.least}
+    )
 
 
 def explain(options: argparse.Namespace) -> Answer:

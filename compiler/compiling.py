@@ -39,7 +39,7 @@ def compile(
         program = program_of(program)
     if not isinstance(program, Program):
         raise AnytimeError(
-            f"compile takes a program, not {program!r}; decorate the function with @compiler.program"
+            f"compile takes a program, not {program!r}; decorate a function with @compiler.program"
         )
     profiles = _needed(program, library)
     if machine is not None:
@@ -87,7 +87,7 @@ def _intervals(
         counts = Counter(rng.choice(problems, size=len(problems)).tolist())
         resampled = tables(program, profiles, counts)
         for column, index in enumerate(chosen):
-            moments = moments_within(resampled, frontier.shares[index])
+            moments = moments_within(resampled, frontier.shares[index].tolist())
             sampled[row, column] = expected_quality(resampled, moments)
     low, high = np.quantile(sampled, [0.025, 0.975], axis=0)
     return tuple(

@@ -22,7 +22,9 @@ def draw_schedule(source: Path, target: Path) -> None:
     times = np.linspace(compiled.least, float(compiled.frontier.budgets[-1]), 300)
     figure, (above, below) = plt.subplots(2, 1, figsize=(6, 6.4), sharex=True)
     above.plot(times, [compiled.promise(t) for t in times], color=COLOURS[0], label="compiled")
-    above.plot(times, baselines.minimal(compiled.tables, times), "--", color=COLOURS[1], label="MIN")
+    above.plot(
+        times, baselines.minimal(compiled.tables, times), "--", color=COLOURS[1], label="MIN"
+    )
     above.plot(times, baselines.maximal(compiled.tables, times), ":", color=COLOURS[3], label="MAX")
     above.set(ylabel="expected quality", ylim=(0, 1.02), title=compiled.name)
     above.legend(frameon=False)

@@ -60,7 +60,7 @@ class _Schedule(Stored):
 
 
 def save(compiled: CompiledProgram, path: Path) -> None:
-    """Write a compiled program, atomically. Raises AnytimeError for constants that no file holds."""
+    """Write a compiled program. Raises AnytimeError for constants that no file holds."""
     frontier = compiled.frontier
     record = _Schedule(
         name=compiled.name,
@@ -98,7 +98,9 @@ def inspect(path: str | Path) -> CompiledProgram:
 
 
 def _cannot_run(*inputs: object) -> None:
-    raise AnytimeError("this program was read to be looked at; compiler.load(…, modules=[…]) runs it")
+    raise AnytimeError(
+        "this program was read to be looked at; compiler.load(…, modules=[…]) runs it"
+    )
 
 
 def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> CompiledProgram:

@@ -96,7 +96,7 @@ def _table(
     if np.prod(shape, dtype=float) > JOINT:
         raise AnytimeError(
             f"{name!r} has {len(shape)} inputs from other modules, {int(np.prod(shape))} "
-            f"combinations of levels; at most {JOINT} are compiled, join inputs in a module of its own"
+            f"combinations of levels; at most {JOINT} are compiled, join some in a module"
         )
     scale = _scale(profile, counts)
     chances = np.zeros((*shape, len(times), len(levels)))

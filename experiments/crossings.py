@@ -55,7 +55,9 @@ def crossing(kind: str, index: int, *, reachable: bool, seed: int = 0) -> Crossi
             free, goal = _cut_off(free, start, goal, rng)
         if start != goal and free[start] and free[goal]:
             if connected(free, start, goal) == reachable:
-                return Crossing(free, start, goal, float(rng.uniform(0.7, 1.0)), int(rng.integers(2**31)))
+                return Crossing(
+                    free, start, goal, float(rng.uniform(0.7, 1.0)), int(rng.integers(2**31))
+                )
 
 
 def _cut_off(
@@ -65,7 +67,7 @@ def _cut_off(
     obstacle that is put on the shortest way."""
     from scipy.ndimage import label
 
-    parts = label(free)[0]
+    parts = np.asarray(label(free)[0])  # pyright: ignore[reportIndexIssue]
     elsewhere = np.argwhere(free & (parts != parts[start]))
     if len(elsewhere):
         return free, _cell(elsewhere[rng.integers(len(elsewhere))])

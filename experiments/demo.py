@@ -39,7 +39,8 @@ class Demo:
         lines = [
             f"{self.briefing.grid.mission.name}: {len(self.reports['monitored'])} missions for "
             "each policy, on the same seeds",
-            f"{'policy':<12}{'net value':>10}{'reached':>9}{'seconds':>9}{'energy':>8}{'frames':>8}",
+            f"{'policy':<12}{'net value':>10}{'reached':>9}{'seconds':>9}"
+            f"{'energy':>8}{'frames':>8}",
         ]
         for name, reports in self.reports.items():
             lines.append(
@@ -58,7 +59,7 @@ class Demo:
         return "\n".join(lines)
 
 
-def _margin(rival: str, figures, key: str) -> str:  # noqa: ANN001
+def _margin(rival: str, figures, key: str) -> str:
     low, high = figures[f"{key}_low"], figures[f"{key}_high"]
     return f"over {rival}: {figures[key]:+.1%} [{low:+.1%}, {high:+.1%}]"
 
@@ -101,9 +102,7 @@ def run(grid: GridMission, *, seeds: Sequence[int], tell: Tell, seed: int = 0) -
     return Demo(briefing, reports, _figures(grid, reports, seed))
 
 
-def _figures(
-    grid: GridMission, reports: dict[str, tuple[Report, ...]], seed: int
-) -> Benchmark:
+def _figures(grid: GridMission, reports: dict[str, tuple[Report, ...]], seed: int) -> Benchmark:
     nets = {row: np.array([report.net for report in lived]) for row, lived in reports.items()}
     figures: dict[str, float | int | None] = {
         f"value.{row}": float(net.mean()) for row, net in nets.items()

@@ -1,4 +1,4 @@
-"""The paper's setting: look at a whole random domain, then plan across it. [ZR93] §3.4, §3.5, §4."""
+"""The paper's setting: look at a whole random domain, then plan across it. [ZR93] §3, §4."""
 
 from __future__ import annotations
 
@@ -37,12 +37,14 @@ class Domain:
         return self.sensor.free
 
 
-def domain(family: str, size: int, index: int, seed: int = 0, vision: Vision | None = None) -> Domain:
+def domain(
+    family: str, size: int, index: int, seed: int = 0, vision: Vision | None = None
+) -> Domain:
     """The domain of this family and index, corner to corner; the sensor reaches everywhere."""
     free, start, goal = instance(family, size, index, seed)
     way = astar(free, start, goal)
     assert way is not None  # instances are connected
-    sensor = Sensor(free, (size // 2, size // 2), size, vision or Vision())
+    sensor = Sensor(free, (size // 2, size // 2), size, Vision())
     return Domain(f"{family}/{size}/{seed}/{index}", sensor, start, goal, way.length)
 
 

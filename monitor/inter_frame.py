@@ -137,4 +137,3 @@ def best_contract(
         "inter-frame",
     )
     return contracts.decision(int(row), float(speeds[column]), why)
-

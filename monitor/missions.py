@@ -1,4 +1,4 @@
-"""A mission: what the task is worth by its completion time, and what energy costs. [ZR93] §3, §5."""
+"""A mission: what a task is worth by its completion time, and what energy costs. [ZR93] §5."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Value:
     """The value of a task as a function of its completion time.
 
     linear: falls from `worth` to 0 at `seconds`. exponential: halves every `seconds`.
-    soft: stays until `seconds`, then falls to 0 at twice that. hard: `worth` until `seconds`, then 0.
+    soft: stays until `seconds`, then falls to 0 at twice that. hard: stays until `seconds`, then 0.
     """
 
     kind: Kind
@@ -85,7 +85,7 @@ class Mission:
     value, energy: what counts; net value = value(completion time) − price × energy, and the value
     counts only if the goal was reached. speeds: (least, greatest), lengths a second.
     job: seconds of work at the goal. gain: how strongly speed answers to a frame that is ahead or
-    behind [ZR93 §5]. fixed: the tuned fixed division (seconds by call, and "speed"), for comparison.
+    behind [ZR93 §5]. fixed: a tuned fixed division (seconds by call, and "speed") to compare with.
     """
 
     value: Value

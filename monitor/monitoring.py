@@ -87,7 +87,11 @@ class _Life:
             if situation.ending is Ending.REACHED:
                 self.robot.work(self.mission.job)
                 self.job = self.mission.job
-                return Ending.REACHED if self.time() <= self.mission.value.deadline else Ending.DEADLINE
+                return (
+                    Ending.REACHED
+                    if self.time() <= self.mission.value.deadline
+                    else Ending.DEADLINE
+                )
             if situation.ending is not None:
                 return situation.ending
             if self.time() >= self.mission.value.deadline:

@@ -68,5 +68,3 @@ class Constant:
 def constant(shares: dict[str, float], speed: float) -> Constant:
     """A tuned fixed division: seconds by call and a speed."""
     return Constant(Decision(shares, speed, Why(case="fixed")))
-
-

@@ -84,7 +84,7 @@ class Report:
 
     @property
     def ledger(self) -> dict[str, float]:
-        """Where the time went: driving + waiting + the job is all of it; below, what thinking took."""
+        """Where the time went: drive + wait + job is all of it; the rest is what thinking took."""
         spent: dict[str, float] = {
             "drive": sum(frame.driven for frame in self.frames),
             "wait": sum(frame.waited for frame in self.frames),

@@ -54,8 +54,9 @@ class Why:
     """The numbers behind a decision.
 
     value, cost: expected value of the task and cost of energy (VOT and COE of [ZR93] §5).
-    seconds: foreseen to be left, before the spread of what really happens. curve: (contract seconds, net value) of the best decision
-    for each contract time. case: which rule decided within a frame.
+    seconds: foreseen to be left, before the spread of what really happens. curve: (contract
+    seconds, net value) of the best decision for each contract time. case: which rule decided
+    within a frame.
     """
 
     value: float = 0.0

@@ -150,7 +150,9 @@ def random_program(rng: np.random.Generator, shared: bool) -> tuple[Table, ...]:
         qualities = np.concatenate([[0.0], np.sort(rng.random(levels - 1)).round(6)])
         labels = tuple(f"call {fed}" for fed in feeds[place])
         tables.append(
-            Table(f"call {place}", f"call {place}", labels, qualities, times, chances, float(times[1]))
+            Table(
+                f"call {place}", f"call {place}", labels, qualities, times, chances, float(times[1])
+            )
         )
     return tuple(tables)
 

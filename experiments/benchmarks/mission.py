@@ -75,7 +75,9 @@ def measure(
         for kind in crossings.KINDS:
             progress(f"{key}: {count} maps of {kind}")
             right += [
-                crossings.cross(program, crossings.crossing(kind, i, reachable=reachable, seed=seed))
+                crossings.cross(
+                    program, crossings.crossing(kind, i, reachable=reachable, seed=seed)
+                )
                 is wanted
                 for i in range(count)
             ]

@@ -118,7 +118,7 @@ class Briefing:
         return report
 
 
-def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort()) -> Briefing:  # noqa: B008
+def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort()) -> Briefing:
     """Compile the paper's program for a mission's machine and measure the mission's rhythm."""
     program = compile(navigate, library.on(grid.machine))
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
@@ -138,5 +138,3 @@ def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort())
 def _neutral(frame: float) -> Sequence[float]:
     """A rhythm for missions of which nothing is known: no detours, no stops."""
     return (0.0, 1.0 / frame, frame, 1.0, 0.0, 1.0)
-
-

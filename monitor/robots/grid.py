@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from planners.navigation import FramePlan, NoWay, Place, follow, travel_cost
 from planners.path_finding import Cell, astar, route
 from sensing import Belief
 from sensing.vision import Device, Sensor, Vision
-
 
 PATIENCE = 4  # fruitless frames after which the robot goes straight for the goal
 
@@ -37,7 +36,7 @@ class Scene:
     goal: Cell
     radius: int = 32
     frame: float = 16.0
-    device: Device = Vision()
+    device: Device = field(default_factory=Vision)
     density: float = 0.2
     name: str = "floor"
 

@@ -165,7 +165,7 @@ def _largest_component(free: np.ndarray) -> np.ndarray:
     """The free cells of the largest connected part of a floor."""
     from scipy.ndimage import label
 
-    parts, count = label(free)
-    if not count:
+    if not free.any():
         raise AnytimeError("the map has no free cell")
+    parts = np.asarray(label(free)[0])  # pyright: ignore[reportIndexIssue]
     return parts == 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))

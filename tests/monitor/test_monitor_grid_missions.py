@@ -1,0 +1,56 @@
+"""Mission files: what they say, and what they must not say."""
+
+import pytest
+
+from anytime import AnytimeError
+from experiments import shipped
+from monitor.robots.grid_missions import read_mission
+
+GOOD = shipped.mission_path().read_text()
+
+
+def written(tmp_path, text: str):
+    file = tmp_path / "m.toml"
+    file.write_text(text.replace('"../office.yaml"', f'"{shipped.DATA / "office.yaml"}"'))
+    return file
+
+
+def test_the_shipped_mission_is_read():
+    grid = read_mission(shipped.mission_path())
+    assert grid.mission.name == "office"
+    assert grid.scene.free[grid.scene.start]
+    assert grid.scene.optimal > 250
+    assert set(grid.mission.fixed) == {"see", "find_path", "speed"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("worth = 100.0", "wort = 100.0", "wort"),
+        ('kind = "soft"', 'kind = "softer"', "value.kind"),
+        ("start = [30, 8]", "start = [0, 0]", "inside an obstacle"),
+        ("start = [30, 8]", "start = [9999, 8]", "off the map"),
+        ("price = 0.2", 'price = "dear"', "price"),
+        ("price = 0.2", "price = nan", "energy.price"),
+        ('kind = "parametric"', 'kind = "crystal ball"', "vision.kind"),
+        ("frame = 16.0", "frame = 99.0", "half the radius"),
+        ("see = 0.25", "see = -1.0", "rate"),
+        ("[value]", "[value", "not TOML"),
+        ("../office.yaml", "../nowhere.yaml", "nowhere.yaml"),
+    ],
+)
+def test_a_mission_file_with_a_mistake_gets_one_line_that_names_it(tmp_path, old, new, told):
+    file = tmp_path / "m.toml"
+    text = GOOD.replace(old, new, 1)
+    text = text.replace('"../office.yaml"', f'"{shipped.DATA / "office.yaml"}"')
+    file.write_text(text)
+    with pytest.raises(AnytimeError, match=told.replace("[", r"\[")) as caught:
+        read_mission(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_camera_can_take_the_place_of_the_papers_sensor(tmp_path):
+    from sensing.camera import Camera
+
+    text = GOOD.replace('kind = "parametric"', 'kind = "camera"')
+    assert isinstance(read_mission(written(tmp_path, text)).scene.device, Camera)

@@ -1,0 +1,114 @@
+"""Policies are pure functions of the state, and do what they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from monitor import Decision, Energy, Mission, Situation, State, Value
+from monitor.calibration import spread_of
+from monitor.inter_frame import Contracts, Spread, best_contract, foresee
+from monitor.intra_frame import keep_course
+from monitor.policies import Expected, Paper, constant
+from monitor.rhythms import Lived, Rhythm, rhythm_of
+
+MISSION = Mission(Value("linear", 100, 200), Energy(0.2, 0.1, 0.03))
+CONTRACTS = Contracts(
+    ("see", "plan"),
+    np.array([[0.5, 0.2], [2.0, 0.2], [6.0, 0.2]]),
+    np.array([1.0, 1.0, 1.0]),
+)
+RHYTHM = Rhythm(
+    np.array([0.5, 6.0]),
+    np.array([0.12, 0.07]),
+    np.array([24.0, 17.0]),
+    np.array([1.5, 1.0]),
+    np.array([0.3, 0.0]),
+    np.array([0.7, 0.95]),
+)
+
+
+def state(time=0.0, to_go=200.0, in_hand=0.0, energy=0.0, **changes) -> State:
+    base = State("frame", time, Situation(energy, to_go, in_hand), standing=in_hand == 0)
+    return replace(base, **changes)
+
+
+@given(st.floats(0, 190), st.floats(0, 500), st.floats(0, 50), st.floats(0, 300))
+def test_the_same_state_leads_to_the_same_decision_within_the_limits(time, to_go, in_hand, energy):
+    for policy in (
+        Paper(MISSION, CONTRACTS, RHYTHM),
+        Expected(MISSION, CONTRACTS, RHYTHM, Spread((0.0,), ((0.8, 1.0, 1.5),))),
+        constant({"see": 1.0, "plan": 0.2}, 4.0),
+    ):
+        asked = state(time, to_go, in_hand, energy)
+        first, second = policy(asked), policy(asked)
+        assert first == second
+        assert MISSION.speeds[0] <= first.speed <= MISSION.speeds[1]
+        assert set(first.shares) == {"see", "plan"}
+
+
+def test_the_decision_is_the_best_of_all_contracts_and_speeds():
+    asked = state()
+    decision = best_contract(MISSION, CONTRACTS, RHYTHM, Spread(), asked)
+    speeds = np.geomspace(*MISSION.speeds, 19)
+    seconds, energy = foresee(MISSION, CONTRACTS, RHYTHM, asked, speeds)
+    net = MISSION.value(seconds) - MISSION.energy.price * energy
+    assert decision.why.net == pytest.approx(net.max())
+    assert decision.why.net == pytest.approx(max(net for _, net in decision.why.curve))
+
+
+@given(st.floats(1, 400), st.floats(1, 50))
+def test_a_longer_way_or_a_later_hour_never_promises_more(to_go, later):
+    def promise(asked):
+        return best_contract(MISSION, CONTRACTS, RHYTHM, Spread(), asked).why.net
+
+    assert promise(state(to_go=to_go + later)) <= promise(state(to_go=to_go)) + 1e-9
+    assert promise(state(time=later)) <= promise(state()) + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("seen", "in_hand", "case"),
+    [
+        (0.9, 40.0, "faster"),  # planning ahead, execution behind
+        (0.1, 4.0, "slower"),  # planning behind, execution ahead
+        (0.9, 4.0, "keep course"),
+        (0.1, 40.0, "keep course"),
+    ],
+)
+def test_the_four_cases_of_the_paper(seen, in_hand, case):
+    contract = Decision({"see": 2.0, "plan": 2.0}, 4.0)
+    now = state(2.0, in_hand=in_hand, moment="call", contract=contract, advertised=0.5, seen=seen)
+    decided = keep_course(MISSION, now)
+    assert decided.why.case == case
+    assert np.sign(decided.speed - 4.0) == {"faster": 1, "slower": -1, "keep course": 0}[case]
+
+
+def test_the_gain_is_a_parameter_of_the_mission():
+    contract = Decision({"see": 2.0, "plan": 2.0}, 4.0)
+    now = state(2.0, in_hand=40.0, moment="call", contract=contract, advertised=0.5, seen=0.9)
+    assert keep_course(replace(MISSION, gain=0.0), now).speed == 4.0
+    assert keep_course(MISSION, now).speed > 4.0
+
+
+def test_rhythm_is_taken_from_missions_and_more_sensing_never_means_more_walking():
+    lived = [
+        Lived(0.5, 100, 210, 150, 11, 3, 0.7),
+        Lived(2.0, 100, 215, 160, 10, 2, 0.8),  # worse by chance
+        Lived(6.0, 100, 120, 118, 7, 0, 0.9),
+    ]
+    rhythm = rhythm_of(lived)
+    walked = rhythm.frames * rhythm.length
+    assert (np.diff(walked) <= 1e-12).all()
+    assert walked[-1] == pytest.approx(1.2)
+    assert rhythm.stretched(10.0, 6.0) == pytest.approx(10 * 120 / 118)
+
+
+def test_the_spread_is_the_quantiles_of_real_over_foreseen():
+    pairs = [(10.0, 12.0)] * 30 + [(100.0, 90.0)] * 30 + [(200.0, 200.0)] * 30
+    spread = spread_of(pairs)
+    assert spread.at(5.0) == pytest.approx(1.2)
+    assert spread.at(100.0) == pytest.approx(0.9)
+    assert spread.at(1e9) == pytest.approx(1.0)
+    assert spread_of([]) == Spread()
