@@ -20,9 +20,7 @@ def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "demo", demo, "the main job, on an office that ships with us")
     parser.add_argument("--seeds", type=int, default=100, help="missions a policy (default 100)")
-    parser.add_argument(
-        "--seed", type=int, default=0, help="of the profiles and the page"
-    )
+    parser.add_argument("--seed", type=int, default=0, help="of the profiles and the page")
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml")
     parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR")
     parser = add_command(commands, "bench", bench, "a benchmark: " + ", ".join(BENCHMARKS))

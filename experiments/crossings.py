@@ -53,11 +53,11 @@ def crossing(kind: str, index: int, *, reachable: bool, seed: int = 0) -> Crossi
         start, goal = (_cell(cells[i]) for i in rng.choice(len(cells), 2, replace=False))
         if not reachable:
             free, goal = _cut_off(free, start, goal, rng)
-        if start != goal and free[start] and free[goal]:
-            if connected(free, start, goal) == reachable:
-                return Crossing(
-                    free, start, goal, float(rng.uniform(0.7, 1.0)), int(rng.integers(2**31))
-                )
+        if start == goal or not (free[start] and free[goal]):
+            continue
+        if connected(free, start, goal) == reachable:
+            quality = float(rng.uniform(0.7, 1.0))
+            return Crossing(free, start, goal, quality, int(rng.integers(2**31)))
 
 
 def _cut_off(

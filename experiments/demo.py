@@ -132,4 +132,4 @@ def write_report(demo: Demo, folder: Path, seed: int) -> Path:
         logs.append(read_log(file))
     table = f"<pre>{html.escape(repr(demo))}</pre>"
     title = f"{demo.briefing.grid.mission.name}, seed {seed}"
-    return write_page(logs, folder / "report.html", summary=table, title=title)
+    return write_page(logs, folder / "report.html", names=tuple(ROWS), summary=table, title=title)

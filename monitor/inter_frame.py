@@ -17,6 +17,7 @@ from monitor.states import Decision, State, Why
 Floats = NDArray[np.float64]
 CONTRACTS = 24  # considered at each decision, at most
 SPEEDS = 19
+PROBE = 0.1  # of a contract, for the price of more time
 
 
 @dataclass(frozen=True)
@@ -26,11 +27,13 @@ class Contracts:
     labels: of the calls. shares: [C, n] seconds of each call; the first call senses.
     efficiency: [C] expected quality of the plan over what unlimited planning would give on the
     same sensing; the frame is expected to be longer by its inverse.
+    probes: [C, n] the efficiency when one of the calls gets a tenth of the contract more.
     """
 
     labels: tuple[str, ...]
     shares: Floats
     efficiency: Floats
+    probes: Floats
 
     @property
     def seconds(self) -> Floats:
@@ -63,15 +66,22 @@ def pinned_contracts(program: CompiledProgram, extreme: str) -> Contracts:
 
 
 def _contracts(program: CompiledProgram, shares: Floats) -> Contracts:
-    quality = [
-        expected_quality(program.tables, moments_within(program.tables, row)) for row in shares
-    ]
-    unlimited = [
-        expected_quality(program.tables, moments_within(program.tables, [*row[:-1], np.inf]))
-        for row in shares
-    ]
-    ratio = np.array(quality) / np.maximum(unlimited, 1e-9)
-    return Contracts(program.labels, shares, np.clip(ratio, 0.05, 1.0))
+    probes = np.array([[_efficiency(program, row) for row in _probed(row)] for row in shares])
+    efficiency = np.array([_efficiency(program, row) for row in shares])
+    return Contracts(program.labels, shares, efficiency, probes)
+
+
+def _probed(row: Floats) -> Floats:
+    """Shares with a tenth of the contract more for each call in turn, [n, n]."""
+    return row + np.eye(len(row)) * PROBE * row.sum()
+
+
+def _efficiency(program: CompiledProgram, row: Floats) -> float:
+    tables = program.tables
+    quality = expected_quality(tables, moments_within(tables, row.tolist()))
+    endless = [*row[:-1].tolist(), np.inf]
+    unlimited = expected_quality(tables, moments_within(tables, endless))
+    return float(np.clip(quality / max(unlimited, 1e-9), 0.05, 1.0))
 
 
 @dataclass(frozen=True)
@@ -123,17 +133,38 @@ def best_contract(
     speeds = np.geomspace(*mission.speeds, SPEEDS)
     seconds, energy = foresee(mission, contracts, rhythm, state, speeds)
     ratios = spread.at(float(np.median(seconds)))
-    value = mission.value(state.time + seconds[..., None] * ratios).mean(axis=-1)
-    used = state.situation.energy + energy * ratios.mean()
-    cost = mission.energy.price * used
+    value, cost = _value_and_cost(mission, state, seconds, energy, ratios)
     net = value - cost
-    row, column = np.unravel_index(int(np.argmax(net)), net.shape)
+    row, column = (int(at) for at in np.unravel_index(int(np.argmax(net)), net.shape))
     best = net.max(axis=1)
+    probes = _probes_of(contracts, row)
+    probed = _value_and_cost(
+        mission, state, *foresee(mission, probes, rhythm, state, speeds), ratios
+    )
+    gains = (probed[0] - probed[1]).max(axis=1) - best[row]
+    step = PROBE * float(contracts.seconds[row])
+    prices = gains / step if step > 0 else np.zeros(len(gains))
     why = Why(
         float(value[row, column]),
         float(cost[row, column]),
         float(seconds[row, column]),
         tuple(zip(contracts.seconds.tolist(), best.tolist(), strict=True)),
         "inter-frame",
+        dict(zip(contracts.labels, prices.tolist(), strict=True)),
     )
-    return contracts.decision(int(row), float(speeds[column]), why)
+    return contracts.decision(row, float(speeds[column]), why)
+
+
+def _value_and_cost(
+    mission: Mission, state: State, seconds: Floats, energy: Floats, ratios: Floats
+) -> tuple[Floats, Floats]:
+    """Expected value of the task and cost of energy, VOT and COE, ([C, V], [C, V])."""
+    value = mission.value(state.time + seconds[..., None] * ratios).mean(axis=-1)
+    used = state.situation.energy + energy * ratios.mean()
+    return value, mission.energy.price * used
+
+
+def _probes_of(contracts: Contracts, row: int) -> Contracts:
+    """The contracts that give each call in turn more than this one does."""
+    shares = _probed(contracts.shares[row])
+    return Contracts(contracts.labels, shares, contracts.probes[row], contracts.probes[row][None])

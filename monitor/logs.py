@@ -118,7 +118,7 @@ class LogWriter:
             line["fixed"] = dict(fixed)
         self._write(line)
 
-    def frame(self, frame: Frame, prices: Mapping[str, float] | None = None) -> None:
+    def frame(self, frame: Frame) -> None:
         """Write a frame. Of its story are drawn: `path`, `plan`, and `belief`, an array of
         probabilities of being blocked or an object with `probabilities()`."""
         if self._mission is None:
@@ -158,8 +158,8 @@ class LogWriter:
             "belief": self._changed(belief),
             "story": story,
         }
-        if prices:
-            line["prices"] = dict(prices)
+        if frame.decision.why.prices:
+            line["prices"] = dict(frame.decision.why.prices)
         self._write(line)
 
     def end(self, report: Report) -> None:

@@ -56,7 +56,7 @@ class Why:
     value, cost: expected value of the task and cost of energy (VOT and COE of [ZR93] §5).
     seconds: foreseen to be left, before the spread of what really happens. curve: (contract
     seconds, net value) of the best decision for each contract time. case: which rule decided
-    within a frame.
+    within a frame. prices: net value of one second more for each call, by label.
     """
 
     value: float = 0.0
@@ -64,6 +64,7 @@ class Why:
     seconds: float = 0.0
     curve: tuple[tuple[float, float], ...] = ()
     case: str = ""
+    prices: Mapping[str, float] = field(default_factory=dict[str, float])
 
     @property
     def net(self) -> float:

@@ -121,9 +121,12 @@ def test_without_a_fixed_mission_the_page_says_how_to_get_one(logs):
 
 
 def test_prices_that_were_logged_name_who_pays(tmp_path, mission, floor, report):
+    first, *others = report.frames[0].moments
+    why = replace(first.decision.why, prices={"see": 0.4, "find_path": 2.5})
+    priced = replace(first, decision=replace(first.decision, why=why))
     with LogWriter(tmp_path / "a.jsonl") as writer:
         writer.mission(mission, policy="expected", seed=3, labels=("see", "find_path"), floor=floor)
-        writer.frame(report.frames[0], prices={"see": 0.4, "find_path": 2.5})
+        writer.frame(replace(report.frames[0], moments=(priced, *others)))
     moment = page_data([read_log(writer.path)])["runs"][0]["frames"][0]["moments"][0]
     assert moment["price"].startswith("find_path pays most for another millisecond")
 

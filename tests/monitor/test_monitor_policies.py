@@ -18,7 +18,8 @@ MISSION = Mission(Value("linear", 100, 200), Energy(0.2, 0.1, 0.03))
 CONTRACTS = Contracts(
     ("see", "plan"),
     np.array([[0.5, 0.2], [2.0, 0.2], [6.0, 0.2]]),
-    np.array([1.0, 1.0, 1.0]),
+    np.array([0.9, 0.9, 0.9]),
+    np.array([[0.9, 1.0]] * 3),
 )
 RHYTHM = Rhythm(
     np.array([0.5, 6.0]),
@@ -57,6 +58,15 @@ def test_the_decision_is_the_best_of_all_contracts_and_speeds():
     net = MISSION.value(seconds) - MISSION.energy.price * energy
     assert decision.why.net == pytest.approx(net.max())
     assert decision.why.net == pytest.approx(max(net for _, net in decision.why.curve))
+
+
+def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
+    slow = replace(MISSION, speeds=(1.0, 1.0))
+    prices = best_contract(slow, CONTRACTS, RHYTHM, Spread(), state()).why.prices
+    assert set(prices) == {"see", "plan"}
+    assert prices["plan"] > 0
+    fast = replace(MISSION, speeds=(50.0, 50.0))
+    assert best_contract(fast, CONTRACTS, RHYTHM, Spread(), state()).why.prices["see"] < 0
 
 
 @given(st.floats(1, 400), st.floats(1, 50))
