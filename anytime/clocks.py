@@ -27,8 +27,9 @@ class Clock(Protocol):
         ...
 
 
+@dataclass(frozen=True)
 class WallClock:
-    """Real time. Work takes as long as it takes."""
+    """Real time. Work takes as long as it takes. All wall clocks are equal."""
 
     def now(self) -> float:
         return time.perf_counter()

@@ -76,6 +76,11 @@ class ProfileLibrary(Mapping[str, Profile]):
             )
         for path in sorted(root.glob("*.profile")):
             profile = read_profile(path)
+            if profile.module != path.stem:
+                raise AnytimeError(
+                    f"{path}: holds the profile of {profile.module!r}; name it "
+                    f"{profile.module}.profile"
+                )
             self._profiles[profile.module] = profile
         if (root / "machine.json").exists():
             self.machine = read_machine(root / "machine.json")
@@ -178,9 +183,7 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     if run.estimates is not None and len(run.estimates) != count:
         raise refuse("estimates and seconds differ in length")
     for name, column in (("seconds", run.seconds), ("work", run.work)):
-        if any(b < a for a, b in pairwise(column)) or (
-            column and column[0] < 0
-        ):
+        if any(b < a for a, b in pairwise(column)) or (column and column[0] < 0):
             raise refuse(f"{name} must not decrease or be negative")
     if min(run.end) < 0:
         raise refuse("the end of a run cannot be negative")

@@ -62,7 +62,9 @@ def line_chart(
     xs = [x for line in series.values() for x in line[0]] or [0.0, 1.0]
     x_low, x_high = min(xs), max(xs)
     x_high = x_high if x_high > x_low else x_low + 1
-    left, right, top, bottom = 48, width - 12, 22 if title else 10, height - 34
+    # The legend stands beside the lines, which it would otherwise hide.
+    left, right = 48, width - (16 if len(series) < 2 else 128)
+    top, bottom = 22 if title else 10, height - 34
     y_low, y_high = y_range
 
     def place(x: float, y: float) -> str:
@@ -76,14 +78,14 @@ def line_chart(
         f"<title>{html.escape(title or y_label)}</title>",
         f'<rect width="{width}" height="{height}" fill="white"/>',
     ]
-    for tick in range(5):
-        y = y_low + (y_high - y_low) * tick / 4
-        x = x_low + (x_high - x_low) * tick / 4
+    for y in _ticks(y_low, y_high):
         _, up = place(x_low, y).split(",")
-        across, _ = place(x, y_low).split(",")
         parts.append(f'<path d="M{left},{up}H{right}" stroke="#ddd"/>')
-        parts.append(f'<text x="{left - 5}" y="{up}" text-anchor="end" dy="4">{y:.3g}</text>')
-        parts.append(f'<text x="{across}" y="{bottom + 14}" text-anchor="middle">{x:.3g}</text>')
+        parts.append(f'<text x="{left - 5}" y="{up}" text-anchor="end" dy="4">{y:.4g}</text>')
+    for x in _ticks(x_low, x_high):
+        across, _ = place(x, y_low).split(",")
+        parts.append(f'<path d="M{across},{bottom}v4" stroke="#999"/>')
+        parts.append(f'<text x="{across}" y="{bottom + 14}" text-anchor="middle">{x:.4g}</text>')
     for index, (label, (bx, low, high)) in enumerate(bands.items()):
         edge = [place(x, y) for x, y in zip(bx, low, strict=True)]
         edge += [place(x, y) for x, y in zip(reversed(bx), reversed(high), strict=True)]
@@ -96,11 +98,12 @@ def line_chart(
         parts.append(
             f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.8"{dash}/>'
         )
-        legend = top + 14 + 14 * index
-        parts.append(
-            f'<path d="M{right - 120},{legend - 4}h18" stroke="{colour}" stroke-width="2"{dash}/>'
-            f'<text x="{right - 98}" y="{legend}">{html.escape(label)}</text>'
-        )
+        if len(series) > 1:
+            legend = top + 14 + 14 * index
+            parts.append(
+                f'<path d="M{right + 8},{legend - 4}h18" stroke="{colour}" stroke-width="2"{dash}/>'
+                f'<text x="{right + 30}" y="{legend}">{html.escape(label[:16])}</text>'
+            )
     middle = (left + right) / 2
     parts.append(
         f'<text x="{middle}" y="{height - 6}" text-anchor="middle">{html.escape(x_label)}</text>'
@@ -112,6 +115,15 @@ def line_chart(
     if title:
         parts.append(f'<text x="{middle}" y="14" text-anchor="middle">{html.escape(title)}</text>')
     return "".join([*parts, "</svg>"])
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Three to seven round numbers between low and high."""
+    rough = (high - low) / 5
+    power = 10.0 ** math.floor(math.log10(rough))
+    step = next(power * n for n in (1, 2, 2.5, 5, 10) if power * n >= rough * (1 - 1e-9))
+    first = math.ceil(low / step - 1e-9)
+    return [step * n for n in range(first, math.floor(high / step + 1e-9) + 1)]
 
 
 def figure(svg: str, text: str) -> str:

@@ -305,7 +305,7 @@ class Profile:
         return max(max((run.end[0] for run in self.recordings), default=0.0), 1e-9)
 
     def __repr__(self) -> str:
-        times = np.linspace(0, self._horizon(), 24)
+        times = np.linspace(0, self._horizon(), 16)
         means = self.mean(times)
         first = self.time_to(1e-9)
         parts = [

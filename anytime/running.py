@@ -250,17 +250,29 @@ def run(
     module's name. What the module raises becomes `Result.fault`.
     Raises AnytimeError for inputs that do not fit the module.
     """
-    if not isinstance(module, Module):
+    if not isinstance(module, Module):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise AnytimeError(f"{module!r} is not a module; decorate it with @anytime.module(…)")
     if (seconds is None) == (deadline is None):
         raise AnytimeError(f"give seconds=… or deadline=… to run {module.name!r}, one of them")
+    ends = bounded(seconds, deadline)
+    return execute(module, inputs, ends, rng=rng, memory=memory, observe=on_result)[0]
+
+
+def bounded(
+    seconds: float | None, deadline: Deadline | None, clock: Clock | None = None
+) -> Deadline:
+    """The deadline that is meant; inside another run on the same clock, the earlier of the two.
+
+    Without a clock, `seconds` are those of the run outside, else real time.
+    """
     outer = _current.get()
     if deadline is None:
-        clock: Clock = outer.deadline.clock if outer else WallClock()
-        deadline = Deadline.after(seconds or 0.0, clock)
-    if outer is not None and outer.deadline.clock is deadline.clock:
-        deadline = Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
-    return execute(module, inputs, deadline, rng=rng, memory=memory, observe=on_result)[0]
+        deadline = Deadline.after(
+            seconds or 0.0, clock or (outer.deadline.clock if outer else WallClock())
+        )
+    if outer is None or outer.deadline.clock != deadline.clock:
+        return deadline
+    return Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
 
 
 def call_inside(module: Module, inputs: tuple[object, ...]) -> Any:

@@ -18,7 +18,7 @@ def minimal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
 
 def maximal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
     """MAX: every call but the last until it no longer improves, the last the rest."""
-    return _rest_to_last([_saturation(table) for table in tables[:-1]], seconds)
+    return _rest_to_last([table.saturation for table in tables[:-1]], seconds)
 
 
 def even_shares(tables: Sequence[Table], seconds: float) -> list[float]:
@@ -58,10 +58,3 @@ def _promised(
 
 def _rest_to_last(shares: list[float], seconds: float) -> list[float]:
     return [*shares, seconds - sum(shares)]
-
-
-def _saturation(table: Table) -> float:
-    """Seconds after which the call's expected quality has reached its greatest value."""
-    expected = table.expected[(slice(1, None),) * len(table.feeds)]
-    mean = expected.reshape(-1, len(table.times)).mean(axis=0)
-    return float(table.times[int(np.flatnonzero(mean >= mean.max() - 1e-9)[0])])

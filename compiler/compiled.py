@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from anytime import running
-from anytime.clocks import Clock, Deadline, WallClock
+from anytime.clocks import Clock, Deadline
 from anytime.errors import AnytimeError
 from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
@@ -136,6 +136,7 @@ class CompiledProgram:
 
         def contract(*inputs: Any, seconds: float) -> Any:
             named = dict(zip(self.program.inputs, inputs, strict=True))
+            running.charge(0.0)  # its calls charge their own work
             deadline = running.here().deadline
             return self.run(deadline=deadline.sooner(seconds), **named).value
 
@@ -165,7 +166,8 @@ class CompiledProgram:
     ) -> Result:
         """Run the program for a budget: each call gets its share, unspent time passes on.
 
-        seconds or deadline: the budget; clock: whose time it is (real time by default).
+        seconds or deadline: the budget; clock: whose time it is (real time by default). Inside
+        another run it ends at the earlier deadline.
         on_result: called with (label, value, change) whenever a call registers a result.
         inputs: by name. Below the least budget nothing is run and there is no result.
         Raises AnytimeError for missing or unknown inputs.
@@ -173,8 +175,9 @@ class CompiledProgram:
         if (seconds is None) == (deadline is None):
             raise AnytimeError(f"give seconds=… or deadline=… to run {self.name!r}, one of them")
         _check_inputs(self.program, inputs)
-        if deadline is None:
-            deadline = Deadline.after(_finite(seconds or 0.0), clock or WallClock())
+        if seconds is not None:
+            _finite(seconds)
+        deadline = running.bounded(seconds, deadline, clock)
         budget = deadline.remaining()
         if self.frontier.index(budget) < 0:
             why = f"{duration(budget)} is below the least budget, {duration(self.least)}"
@@ -211,6 +214,9 @@ class CompiledProgram:
             held = None
             if call.module.generator and not last:
                 held = guard(self.steps.get(call.module.name), ends, hard)
+            if not last and not held:
+                # A share that others have used up still leaves time for a first result.
+                ends = max(ends, min(clock.now() + self.tables[place].first, hard))
             # A generator with a guard is held to its share by it, the others by their deadline.
             own = Deadline(clock, hard if held else ends)
             may_step = held or Run.may_step
@@ -274,7 +280,8 @@ class CompiledProgram:
         save(self, Path(path))
 
     def _budgets(self, count: int = 6) -> Sequence[float]:
-        return np.geomspace(self.least, self.frontier.budgets[-1], count).tolist()
+        most = float(self.frontier.budgets[-1])
+        return np.geomspace(max(self.least, 1e-3 * most, 1e-9), max(most, 1e-9), count).tolist()
 
     def __repr__(self) -> str:
         width = max(12, *(len(label) + 2 for label in self.labels))

@@ -51,7 +51,8 @@ def divide(tables: Sequence[Table]) -> Frontier:
 
     Over distributions and exact on the tables' moments for one and two calls, and for any number
     where nothing is left to chance. Beyond, pairs of calls exchange their time optimally while
-    the others keep theirs, starting from the (min, +) solution for mean qualities.
+    the others keep theirs, starting from the best of the (min, +) solution for mean qualities
+    and the plain divisions (MIN, MAX, equal shares), which it so never falls below.
     """
     if len(tables) == 1:
         values = tables[0].expected
@@ -63,6 +64,10 @@ def divide(tables: Sequence[Table]) -> Frontier:
     totals, moments, values = _from_mean_levels(tables)
     if all(_certain(table) for table in tables):
         return _frontier(tables, totals, moments, values)
+    plain = _plain(tables)
+    totals = np.concatenate([totals, plain[0]])
+    moments = np.concatenate([moments, plain[1]])
+    values = np.concatenate([values, plain[2]])
     least = float(totals[values > 0].min(initial=np.inf))
     most = float(sum(table.times[-1] for table in tables))
     if np.isfinite(least):
@@ -150,6 +155,24 @@ def _exchanged(
         np.concatenate([moments for _, moments, _ in met]),
         np.concatenate([values for _, _, values in met]),
     )
+
+
+def _plain(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp], Floats]:
+    """MIN, MAX, and each call until it first may have a result, with every moment of the last;
+    and equal shares."""
+    may = [(t.chances[..., 0] < 1).reshape(-1, len(t.times)).any(axis=0) for t in tables]
+    bases = [
+        moments_within(tables, [table.first for table in tables]),
+        moments_within(tables, [table.saturation for table in tables]),
+        tuple(int(there.argmax()) for there in may),
+    ]
+    found: set[tuple[int, ...]]
+    found = {(*base[:-1], last) for base in bases for last in range(len(tables[-1].times))}
+    for share in np.unique(np.concatenate([table.times for table in tables])):
+        found.add(moments_within(tables, [float(share)] * len(tables)))
+    moments = np.array(sorted(found), dtype=np.intp)
+    totals = np.sum([t.times[moments[:, i]] for i, t in enumerate(tables)], axis=0)
+    return totals, moments, np.array([expected_quality(tables, row) for row in moments])
 
 
 def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp], Floats]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +13,7 @@ import numpy as np
 from anytime.errors import AnytimeError
 from anytime.files import Stored, read_record, write_record
 from anytime.modules import Module
-from anytime.programs import Call, Constant, Input, Program
+from anytime.programs import Call, Constant, Input, Program, upstream
 from compiler.division import Frontier
 from compiler.guarding import Steps
 from compiler.tables import Table
@@ -108,7 +110,8 @@ def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> Compil
 
     program = _bind(file, stored, {module.name: module for module in modules})
     made = tuple(_restore_table(file, table) for table in stored.tables)
-    _check(file, stored, made)
+    _check_tables(file, program, made)
+    _check_divisions(file, stored)
     return CompiledProgram(
         program=program,
         tables=made,
@@ -118,11 +121,7 @@ def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> Compil
             np.array(stored.promised),
         ),
         intervals=tuple(Interval(*row) for row in stored.intervals),
-        steps={
-            name: Steps(tuple(rows[0]), tuple(rows[1]))
-            for name, rows in stored.steps.items()
-            if len(rows) == 2
-        },
+        steps={name: Steps(tuple(rows[0]), tuple(rows[1])) for name, rows in stored.steps.items()},
         machine=stored.machine,
     )
 
@@ -152,6 +151,10 @@ def _store_call(call: Call) -> _Call:
 def _bind(path: Path, stored: _Schedule, modules: dict[str, Module]) -> Program:
     calls: dict[str, Call] = {}
     for record in stored.calls:
+        if record.label in calls:
+            raise AnytimeError(f"{path}: two calls have the label {record.label!r}")
+        if len(record.arguments) != len(record.parameters):
+            raise AnytimeError(f"{path}: {record.label} has not one argument for each parameter")
         module = modules.get(record.module)
         if module is None:
             raise AnytimeError(
@@ -166,6 +169,8 @@ def _bind(path: Path, stored: _Schedule, modules: dict[str, Module]) -> Program:
         arguments: list[Input | Constant | Call] = []
         for argument in record.arguments:
             if argument.input is not None:
+                if argument.input not in stored.inputs:
+                    raise AnytimeError(f"{path}: the program has no input {argument.input!r}")
                 arguments.append(Input(argument.input))
             elif argument.call is None:
                 arguments.append(Constant(argument.constant))
@@ -195,32 +200,60 @@ def _store_table(table: Table) -> _Table:
 
 
 def _restore_table(path: Path, record: _Table) -> Table:
-    if int(np.prod(record.shape, dtype=float)) != len(record.chances):
-        raise AnytimeError(
-            f"{path}: table {record.label}: chances do not fill shape {record.shape}"
-        )
-    if record.shape[-2:] != [len(record.times), len(record.levels)]:
-        raise AnytimeError(f"{path}: table {record.label}: shape does not fit times and levels")
-    if any(not -1e-9 <= chance <= 1 + 1e-6 for chance in record.chances):
-        raise AnytimeError(f"{path}: table {record.label}: a chance lies outside [0, 1]")
+    def refuse(reason: str) -> AnytimeError:
+        return AnytimeError(f"{path}: table {record.label}: {reason}")
+
+    times, levels = np.array(record.times, dtype=float), np.array(record.levels, dtype=float)
+    if not len(times) or times[0] != 0 or (np.diff(times) <= 0).any():
+        raise refuse("times must increase from 0")
+    if not len(levels) or levels[0] != 0 or levels.min() < 0 or levels.max() > 1:
+        raise refuse("levels must begin with 0, for no result, and lie in [0, 1]")
+    if record.first < 0:
+        raise refuse("the time of the first result is negative")
+    if record.shape[-2:] != [len(times), len(levels)] or min(record.shape) < 1:
+        raise refuse("shape does not fit times and levels")
+    if math.prod(record.shape) != len(record.chances):
+        raise refuse(f"chances do not fill shape {record.shape}")
+    chances = np.array(record.chances, dtype=float).reshape(record.shape)
+    if chances.min() < -1e-9 or (np.abs(chances.sum(axis=-1) - 1) > 1e-6).any():
+        raise refuse("chances must be >= 0 and sum to 1 over the levels")
     return Table(
-        record.label,
-        record.module,
-        tuple(record.feeds),
-        np.array(record.levels),
-        np.array(record.times),
-        np.array(record.chances).reshape(record.shape),
-        record.first,
+        record.label, record.module, tuple(record.feeds), levels, times, chances, record.first
     )
 
 
-def _check(path: Path, stored: _Schedule, tables: Sequence[Table]) -> None:
-    if [table.label for table in tables] != [call.label for call in stored.calls]:
+def _check_tables(path: Path, program: Program, tables: Sequence[Table]) -> None:
+    if [(t.label, t.module) for t in tables] != [(c.label, c.module.name) for c in program.calls]:
         raise AnytimeError(f"{path}: its tables are not those of its calls")
+    levels = {table.label: len(table.levels) for table in tables}
+    for call, table in zip(program.calls, tables, strict=True):
+        feeds = tuple(source.label for source in upstream(call).values())
+        if table.feeds != feeds or table.chances.shape[:-2] != tuple(levels[f] for f in feeds):
+            raise AnytimeError(f"{path}: table {table.label} does not fit the calls that feed it")
+
+
+def _check_divisions(path: Path, stored: _Schedule) -> None:
     count = len(stored.budgets)
     if not count or len(stored.shares) != count or len(stored.promised) != count:
         raise AnytimeError(f"{path}: budgets, shares and promised differ in length or are empty")
-    if any(len(row) != len(tables) for row in stored.shares):
+    if any(len(row) != len(stored.tables) for row in stored.shares):
         raise AnytimeError(f"{path}: a row of shares has not one share for each call")
-    if any(b <= a for a, b in zip(stored.budgets, stored.budgets[1:], strict=False)):
-        raise AnytimeError(f"{path}: budgets must increase")
+    budgets, shares = np.array(stored.budgets, dtype=float), np.array(stored.shares, dtype=float)
+    if budgets[0] < 0 or (np.diff(budgets) <= 0).any():
+        raise AnytimeError(f"{path}: budgets must increase and be >= 0")
+    if shares.min() < 0 or (shares.sum(axis=1) > budgets * (1 + 1e-9) + 1e-9).any():
+        raise AnytimeError(f"{path}: shares must be >= 0 and sum to no more than their budget")
+    promised = np.array(stored.promised, dtype=float)
+    if promised[0] < 0 or promised[-1] > 1 + 1e-6 or (np.diff(promised) < 0).any():
+        raise AnytimeError(f"{path}: promised qualities must lie in [0, 1] and not decrease")
+    if not stored.intervals or any(low > high for _, low, high in stored.intervals):
+        raise AnytimeError(f"{path}: intervals are missing, or one has its low end above its high")
+    if any(a >= b for (a, *_), (b, *_) in pairwise(stored.intervals)):
+        raise AnytimeError(f"{path}: the budgets of intervals must increase")
+    for name, rows in stored.steps.items():
+        if (
+            len(rows) != 2
+            or len(rows[0]) != len(rows[1])
+            or min([*rows[0], *rows[1]], default=0) < 0
+        ):
+            raise AnytimeError(f"{path}: steps.{name} is not two rows of seconds >= 0")

@@ -43,6 +43,14 @@ class Table:
         """Expected quality, [L_1, …, L_k, M]."""
         return self.chances @ self.levels
 
+    @property
+    def saturation(self) -> float:
+        """Seconds after which the expected quality, on average over inputs, is at its greatest."""
+        expected = self.expected[(slice(1, None),) * len(self.feeds)]
+        inputs = max(expected.size // len(self.times), 1)
+        mean = expected.reshape(-1, len(self.times)).sum(axis=0) / inputs
+        return float(self.times[int(np.flatnonzero(mean >= mean.max() - 1e-9)[0])])
+
     def faster(self, factor: float) -> Table:
         """This call with its module `factor` times as fast."""
         return replace(self, times=self.times / factor, first=self.first / factor)

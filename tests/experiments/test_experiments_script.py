@@ -14,16 +14,9 @@ LAB = ROOT / "tests" / "lab"
 
 
 def script() -> str:
-    """What the README prints; the same text is kept beside the lab."""
-    readme = ROOT / "README.md"
-    text = readme.read_text() if readme.exists() else ""
-    blocks = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    told = [block for block in blocks if block.startswith("import anytime, compiler")]
-    return told[0] if told else (LAB / "script.py").read_text()
-
-
-def test_readme_prints_the_script_that_the_lab_keeps():
-    assert script() == (LAB / "script.py").read_text()
+    """What the README prints."""
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), flags=re.DOTALL)
+    return next(block for block in blocks if block.startswith("import anytime, compiler"))
 
 
 def test_script_prints_a_table_advice_and_a_result_and_writes_its_schedule(

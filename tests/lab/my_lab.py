@@ -5,6 +5,7 @@ It stands for the code that a reader of the README already has. Nothing here kno
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -101,9 +102,9 @@ def _overlap(a: np.ndarray, b: np.ndarray) -> float:
 
 def length(path: list[Point], scene: Scene) -> float:
     """Metres that are really walked: along the path, and around each real box that it runs into."""
-    walked = sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+    walked = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
     bumped = np.zeros(len(scene.truth), dtype=bool)
-    for a, b in zip(path, path[1:], strict=False):
+    for a, b in itertools.pairwise(path):
         bumped |= _crossed(a, b, scene.truth)
     size = scene.truth[:, 2:] - scene.truth[:, :2]
     return walked + float(2 * size.sum(axis=1)[bumped].sum())
@@ -132,7 +133,7 @@ class RRTStar:
         goal: Point,
         on_solution: Callable[[list[Point]], object],
     ) -> None:
-        self.boxes = np.asarray(boxes, dtype=float).reshape(-1, 4) + (-1, -1, 1, 1)
+        self.boxes = np.asarray(boxes, dtype=float).reshape(-1, 4) + np.array([-1, -1, 1, 1])
         self.goal = goal
         self.on_solution = on_solution
         self.points = [start]
@@ -181,7 +182,7 @@ class RRTStar:
             path.append(self.points[last])
             last = self.parents[last]
         path = [self.points[0], *reversed(path)]
-        cost = sum(math.dist(a, b) for a, b in zip(path, path[1:], strict=False))
+        cost = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
         if cost < self.best - 1e-9:
             self.best = cost
             self.on_solution(path)
