@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -64,7 +65,7 @@ class Frame:
 class Report:
     """The outcome of a mission.
 
-    promised: net value computed when the task was presented. net: what it was really worth.
+    promised: net value computed when the task was presented, NaN without foresight. net: what it was really worth.
     seconds: completion or ending time; energy used; job: seconds of work at the goal.
     """
 
@@ -96,13 +97,16 @@ class Report:
         spent["overrun"] = sum(call.overrun for frame in self.frames for call in frame.calls)
         return spent
 
+    def _promise(self) -> str:
+        return "" if math.isnan(self.promised) else f" (promised {self.promised:.1f})"
+
     def __bool__(self) -> bool:
         return self.ending is Ending.REACHED
 
     def __repr__(self) -> str:
         head = (
             f"{self.mission}, {self.policy}, seed {self.seed}: {self.ending.value} after "
-            f"{duration(self.seconds)}, net value {self.net:.1f} (promised {self.promised:.1f})"
+            f"{duration(self.seconds)}, net value {self.net:.1f}{self._promise()}"
         )
         ledger = ", ".join(f"{name} {duration(spent)}" for name, spent in self.ledger.items())
         contracts = [frame.decision.contract for frame in self.frames]
