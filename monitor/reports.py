@@ -65,7 +65,8 @@ class Frame:
 class Report:
     """The outcome of a mission.
 
-    promised: net value computed when the task was presented, NaN without foresight. net: what it was really worth.
+    promised: net value computed when the task was presented, NaN without foresight.
+    net: what it was really worth.
     seconds: completion or ending time; energy used; job: seconds of work at the goal.
     """
 
