@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from anytime import programs
+from anytime import calling
 from anytime.errors import AnytimeError
 
 Score = Callable[..., float]
@@ -55,17 +55,13 @@ class Module:
         return function(result, problem) if _takes_two(function) else function(result)
 
     def __call__(self, *arguments: object) -> Any:
-        opened = programs.being_read()
-        if opened is None:
-            from anytime.running import call_inside
-
-            return call_inside(self, arguments)
-        if len(arguments) != len(self.parameters):
+        caller = calling.current.get()
+        if caller is None:
             raise AnytimeError(
-                f"program {opened.program!r} calls {self.name} with {len(arguments)} arguments; "
-                f"it takes {len(self.parameters)}: {', '.join(self.parameters)}"
+                f"{self.name} is a module: use anytime.run({self.name}, …, seconds=…), "
+                "or call it in a function decorated with @compiler.program"
             )
-        return opened.call(self, arguments)
+        return caller.call(self, arguments)
 
     def __repr__(self) -> str:
         kind = "contract module" if self.contract else "module"

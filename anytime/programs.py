@@ -5,14 +5,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
+from anytime import calling
 from anytime.errors import AnytimeError
-
-if TYPE_CHECKING:
-    from anytime.modules import Module
+from anytime.modules import Module
 
 
 class Reading:
@@ -25,8 +23,14 @@ class Reading:
     def call(self, module: Module, arguments: tuple[object, ...]) -> Call:
         """A new call; plain arguments become constants, the label is numbered when it repeats.
 
-        Raises AnytimeError for two modules of one name: profiles are kept by name.
+        Raises AnytimeError for the wrong number of arguments, and for two modules of one name:
+        profiles are kept by name.
         """
+        if len(arguments) != len(module.parameters):
+            raise AnytimeError(
+                f"program {self.program!r} calls {module.name} with {len(arguments)} arguments; "
+                f"it takes {len(module.parameters)}: {', '.join(module.parameters)}"
+            )
         if any(c.module.name == module.name and c.module is not module for c in self.calls):
             raise AnytimeError(
                 f"two different modules are named {module.name!r}; give one @anytime.module(name=…)"
@@ -42,32 +46,23 @@ class Reading:
         return made
 
 
-# Set while the function of a program is called with symbolic inputs.
-_reading: ContextVar[Reading | None] = ContextVar("reading", default=None)
-
-
 @contextmanager
 def reading(program: str) -> Iterator[Reading]:
     """While this is open, calling a module makes a `Call` instead of running it."""
     opened = Reading(program)
-    token = _reading.set(opened)
+    token = calling.current.set(opened)
     try:
         yield opened
     finally:
-        _reading.reset(token)
-
-
-def being_read() -> Reading | None:
-    """The program that is being read, or None."""
-    return _reading.get()
+        calling.current.reset(token)
 
 
 class _Symbol:
     """A value that is not known while a program is read; using it as one is refused."""
 
     def _refuse(self, what: str, cure: str) -> NoReturn:
-        opened = being_read()
-        where = f"program {opened.program!r}" if opened else "a program"
+        opened = calling.current.get()
+        where = f"program {opened.program!r}" if isinstance(opened, Reading) else "a program"
         raise AnytimeError(
             f"{where} {what} {self!r}, whose value is not known when it is compiled; {cure}"
         )
@@ -101,7 +96,7 @@ class _Symbol:
     __len__ = __contains__ = __float__ = __int__ = __add__
 
     def __eq__(self, other: object) -> bool:
-        if self is not other and being_read() is not None:
+        if self is not other and isinstance(calling.current.get(), Reading):
             self._refuse("compares", "use compiler.branch(test, then, otherwise)")
         return self is other
 

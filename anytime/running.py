@@ -6,13 +6,13 @@ import hashlib
 import math
 import traceback
 from collections.abc import Callable, Mapping
-from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from anytime import calling
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
@@ -181,6 +181,10 @@ class Run:
             average += 0.4 * (min(seconds, 4 * average + 1e-6) - average)
         return average <= left
 
+    def call(self, module: Module, arguments: tuple[Any, ...]) -> Any:
+        """A module called like a function inside this run: run with what is left."""
+        return execute(module, arguments, self.deadline)[0].value
+
     def close(self) -> None:
         self._closed = True
 
@@ -189,9 +193,6 @@ class Run:
             raise OutsideRunError(
                 f"the run of {self.module.name!r} has ended; what comes later is not registered"
             )
-
-
-_current: ContextVar[Run | None] = ContextVar("run", default=None)
 
 
 def here() -> Run:
@@ -224,8 +225,8 @@ def charge(work: float) -> None:
 
 
 def _here(called: str) -> Run:
-    run = _current.get()
-    if run is None:
+    run = calling.current.get()
+    if not isinstance(run, Run):
         raise OutsideRunError(
             f"anytime.{called}() outside a run; use anytime.run(module, …, seconds=…), "
             "and in a thread the object of anytime.here()"
@@ -265,7 +266,8 @@ def bounded(
 
     Without a clock, `seconds` are those of the run outside, else real time.
     """
-    outer = _current.get()
+    caller = calling.current.get()
+    outer = caller if isinstance(caller, Run) else None
     if deadline is None:
         deadline = Deadline.after(
             seconds or 0.0, clock or (outer.deadline.clock if outer else WallClock())
@@ -273,18 +275,6 @@ def bounded(
     if outer is None or outer.deadline.clock != deadline.clock:
         return deadline
     return Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
-
-
-def call_inside(module: Module, inputs: tuple[object, ...]) -> Any:
-    """A module called like a function inside another's run: run with what is left."""
-    outer = _current.get()
-    if outer is None:
-        raise AnytimeError(
-            f"{module.name} is a module: use anytime.run({module.name}, …, seconds=…), "
-            "or call it in a function decorated with @compiler.program"
-        )
-    result, _ = execute(module, inputs, outer.deadline)
-    return result.value
 
 
 def seed_of(*what: object) -> int:
@@ -347,7 +337,7 @@ def _generate(
     try:
         while may_step(current):
             # Around each step alone: a context variable set in a generator leaks to its caller.
-            token = _current.set(current)
+            token = calling.current.set(current)
             try:
                 value = next(steps)
             except StopIteration as end:
@@ -356,7 +346,7 @@ def _generate(
                     current.record(end.value)
                 return True
             finally:
-                _current.reset(token)
+                calling.current.reset(token)
             current.check()
             if value is not None:
                 current.record(value)
@@ -366,11 +356,11 @@ def _generate(
 
 
 def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool:
-    token = _current.set(current)
+    token = calling.current.set(current)
     try:
         value = current.module.function(*inputs, **filled)
     finally:
-        _current.reset(token)
+        calling.current.reset(token)
     if value is not None:
         current.check()
         current.record(value)

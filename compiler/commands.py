@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from anytime.command_line import Answer, add_command, positive, resolve
+from anytime.command_line import Answer, add_command, folder, positive, resolve, target
 from anytime.errors import AnytimeError
 
 
@@ -16,15 +16,17 @@ def declare(commands: Any) -> None:
         commands, "compile", compile_program, "divide time among a program's modules"
     )
     parser.add_argument("program", help="a registered name or FILE.py:NAME")
-    parser.add_argument("--library", type=Path, default=Path("profiles"), metavar="DIR")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default NAME.schedule")
+    parser.add_argument(
+        "--library", type=folder, default=Path("profiles"), metavar="DIR", help="default: profiles"
+    )
+    parser.add_argument("-o", "--output", type=target, metavar="FILE", help="default NAME.schedule")
     for name, run, summary in (
         ("explain", explain, "who gets how much of a budget, and why"),
         ("advise", advise, "which module is worth speeding up"),
     ):
         parser = add_command(commands, name, run, summary)
-        parser.add_argument("file", type=Path)
-        parser.add_argument("--seconds", type=positive, required=True)
+        parser.add_argument("file", type=Path, help="what `anytime compile` wrote")
+        parser.add_argument("--seconds", type=positive, required=True, help="the budget")
 
 
 def compile_program(options: argparse.Namespace) -> Answer:
@@ -37,10 +39,10 @@ def compile_program(options: argparse.Namespace) -> Answer:
     if not isinstance(program, Module | Program):
         raise AnytimeError(f"{options.program} is {type(program).__name__}, not a program")
     compiled = compile(program, ProfileLibrary(options.library))
-    target: Path = options.output or Path(f"{compiled.name}.schedule")
-    compiled.save(target)
+    written: Path = options.output or Path(f"{compiled.name}.schedule")
+    compiled.save(written)
     return Answer(
-        f"{compiled!r}\nwritten to {target}", {"file": str(target), "least": compiled.least}
+        f"{compiled!r}\nwritten to {written}", {"file": str(written), "least": compiled.least}
     )
 
 

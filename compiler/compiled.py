@@ -22,19 +22,12 @@ from compiler import baselines
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.explaining import Advice, Explanation, advise, explain
 from compiler.guarding import Steps, guard
+from compiler.intervals import Interval
+from compiler.storing import save
 from compiler.tables import Table
 
 Listener = Callable[[str, Any, Change], None]
 QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
-
-
-@dataclass(frozen=True)
-class Interval:
-    """A 95 % interval of the promised expected quality for one budget in seconds."""
-
-    seconds: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -275,8 +268,6 @@ class CompiledProgram:
 
     def save(self, path: str | Path) -> None:
         """Write the compiled program to a file; `compiler.load` reads it back."""
-        from compiler.loading import save
-
         save(self, Path(path))
 
     def _budgets(self, count: int = 6) -> Sequence[float]:

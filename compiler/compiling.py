@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping
-
-import numpy as np
 
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
 from anytime.modules import Module
 from anytime.profiles import Profile
 from anytime.programs import Program, program_of
-from compiler.compiled import CompiledProgram, Interval
-from compiler.division import Frontier, divide, expected_quality, moments_within
+from compiler.compiled import CompiledProgram
+from compiler.division import divide
 from compiler.guarding import guards_of
+from compiler.intervals import intervals_of
 from compiler.tables import tables
-
-BUDGETS = 8  # at which intervals are given
-RESAMPLES = 60  # of the problems, for each interval
 
 
 def compile(
@@ -56,7 +51,7 @@ def compile(
         program=program,
         tables=made,
         frontier=frontier,
-        intervals=_intervals(program, profiles, frontier, seed),
+        intervals=intervals_of(program, profiles, frontier, seed),
         steps=guards_of(profiles),
         machine=" and ".join(sorted(names)),
     )
@@ -71,26 +66,3 @@ def _needed(program: Program, library: Mapping[str, Profile]) -> dict[str, Profi
             f"anytime.measure({program.name}, problems, seconds=…) measures them all"
         )
     return {name: library[name] for name in needed}
-
-
-def _intervals(
-    program: Program, profiles: Mapping[str, Profile], frontier: Frontier, seed: int
-) -> tuple[Interval, ...]:
-    """Bootstrap over problems of what the chosen divisions promise."""
-    problems = sorted({p for profile in profiles.values() for p in profile.problems})
-    rng = np.random.default_rng(seed)
-    chosen = np.unique(
-        np.linspace(0, len(frontier.budgets) - 1, min(BUDGETS, len(frontier.budgets))).astype(int)
-    )
-    sampled = np.zeros((RESAMPLES, len(chosen)))
-    for row in range(RESAMPLES):
-        counts = Counter(rng.choice(problems, size=len(problems)).tolist())
-        resampled = tables(program, profiles, counts)
-        for column, index in enumerate(chosen):
-            moments = moments_within(resampled, frontier.shares[index].tolist())
-            sampled[row, column] = expected_quality(resampled, moments)
-    low, high = np.quantile(sampled, [0.025, 0.975], axis=0)
-    return tuple(
-        Interval(float(frontier.budgets[index]), float(a), float(b))
-        for index, a, b in zip(chosen, low, high, strict=True)
-    )

@@ -1,4 +1,4 @@
-"""Compiled programs as files. A file names its modules and never imports them."""
+"""Compiled programs read from files. A file names its modules and never imports them."""
 
 from __future__ import annotations
 
@@ -6,77 +6,19 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from anytime.errors import AnytimeError
-from anytime.files import Stored, read_record, write_record
+from anytime.files import read_record
 from anytime.modules import Module
 from anytime.programs import Call, Constant, Input, Program, upstream
+from compiler.compiled import CompiledProgram
 from compiler.division import Frontier
 from compiler.guarding import Steps
+from compiler.intervals import Interval
+from compiler.storing import SCHEMA, StoredSchedule, StoredTable
 from compiler.tables import Table
-
-if TYPE_CHECKING:
-    from compiler.compiled import CompiledProgram
-
-SCHEMA = "anytime.schedule/1"
-
-
-class _Argument(Stored):
-    input: str | None = None
-    call: str | None = None
-    constant: float | int | str | bool | None = None
-
-
-class _Call(Stored):
-    label: str
-    module: str
-    parameters: list[str]
-    arguments: list[_Argument]
-
-
-class _Table(Stored):
-    label: str
-    module: str
-    feeds: list[str]
-    levels: list[float]
-    times: list[float]
-    shape: list[int]
-    chances: list[float]
-    first: float
-
-
-class _Schedule(Stored):
-    name: str
-    inputs: list[str]
-    machine: str
-    calls: list[_Call]
-    tables: list[_Table]
-    budgets: list[float]
-    shares: list[list[float]]
-    promised: list[float]
-    intervals: list[tuple[float, float, float]]
-    steps: dict[str, list[list[float]]]
-
-
-def save(compiled: CompiledProgram, path: Path) -> None:
-    """Write a compiled program. Raises AnytimeError for constants that no file holds."""
-    frontier = compiled.frontier
-    record = _Schedule(
-        name=compiled.name,
-        inputs=list(compiled.program.inputs),
-        machine=compiled.machine,
-        calls=[_store_call(call) for call in compiled.program.calls],
-        tables=[_store_table(table) for table in compiled.tables],
-        budgets=frontier.budgets.tolist(),
-        shares=frontier.shares.tolist(),
-        promised=frontier.promised.tolist(),
-        intervals=[(i.seconds, i.low, i.high) for i in compiled.intervals],
-        steps={name: [list(s.median), list(s.p95)] for name, s in compiled.steps.items()},
-    )
-    write_record(path, SCHEMA, record)
 
 
 def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
@@ -85,13 +27,13 @@ def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
     Raises AnytimeError for a broken file, for a module that is missing or has other parameters.
     """
     file = Path(path)
-    return _restore(file, read_record(file, SCHEMA, _Schedule), modules)
+    return _restore(file, read_record(file, SCHEMA, StoredSchedule), modules)
 
 
 def inspect(path: str | Path) -> CompiledProgram:
     """Read a compiled program to look at: its calls are bound to modules that cannot run."""
     file = Path(path)
-    stored = read_record(file, SCHEMA, _Schedule)
+    stored = read_record(file, SCHEMA, StoredSchedule)
     modules = {
         call.module: Module(call.module, _cannot_run, tuple(call.parameters))
         for call in stored.calls
@@ -105,9 +47,7 @@ def _cannot_run(*inputs: object) -> None:
     )
 
 
-def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> CompiledProgram:
-    from compiler.compiled import CompiledProgram, Interval
-
+def _restore(file: Path, stored: StoredSchedule, modules: Sequence[Module]) -> CompiledProgram:
     program = _bind(file, stored, {module.name: module for module in modules})
     made = tuple(_restore_table(file, table) for table in stored.tables)
     _check_tables(file, program, made)
@@ -126,29 +66,7 @@ def _restore(file: Path, stored: _Schedule, modules: Sequence[Module]) -> Compil
     )
 
 
-def _store_call(call: Call) -> _Call:
-    arguments: list[_Argument] = []
-    for argument in call.arguments:
-        if isinstance(argument, Input):
-            arguments.append(_Argument(input=argument.name))
-        elif isinstance(argument, Call):
-            arguments.append(_Argument(call=argument.label))
-        elif isinstance(argument.value, float | int | str | bool | None):
-            arguments.append(_Argument(constant=argument.value))
-        else:
-            raise AnytimeError(
-                f"{call!r} has a constant of type {type(argument.value).__name__}, which a file "
-                "cannot hold; make it an input of the program"
-            )
-    return _Call(
-        label=call.label,
-        module=call.module.name,
-        parameters=list(call.module.parameters),
-        arguments=arguments,
-    )
-
-
-def _bind(path: Path, stored: _Schedule, modules: dict[str, Module]) -> Program:
+def _bind(path: Path, stored: StoredSchedule, modules: dict[str, Module]) -> Program:
     calls: dict[str, Call] = {}
     for record in stored.calls:
         if record.label in calls:
@@ -186,20 +104,7 @@ def _bind(path: Path, stored: _Schedule, modules: dict[str, Module]) -> Program:
     )
 
 
-def _store_table(table: Table) -> _Table:
-    return _Table(
-        label=table.label,
-        module=table.module,
-        feeds=list(table.feeds),
-        levels=table.levels.tolist(),
-        times=table.times.tolist(),
-        shape=list(table.chances.shape),
-        chances=[float(f"{chance:.9g}") for chance in table.chances.ravel()],
-        first=table.first,
-    )
-
-
-def _restore_table(path: Path, record: _Table) -> Table:
+def _restore_table(path: Path, record: StoredTable) -> Table:
     def refuse(reason: str) -> AnytimeError:
         return AnytimeError(f"{path}: table {record.label}: {reason}")
 
@@ -232,7 +137,7 @@ def _check_tables(path: Path, program: Program, tables: Sequence[Table]) -> None
             raise AnytimeError(f"{path}: table {table.label} does not fit the calls that feed it")
 
 
-def _check_divisions(path: Path, stored: _Schedule) -> None:
+def _check_divisions(path: Path, stored: StoredSchedule) -> None:
     count = len(stored.budgets)
     if not count or len(stored.shares) != count or len(stored.promised) != count:
         raise AnytimeError(f"{path}: budgets, shares and promised differ in length or are empty")

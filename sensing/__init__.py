@@ -2,7 +2,8 @@
 
 from sensing.belief import Belief, weight_of
 from sensing.camera import Camera
-from sensing.maps import GridMap, map_folder, nearest_free, read_map, trace_folder
+from sensing.map_files import map_folder, read_map, trace_folder
+from sensing.maps import GridMap, nearest_free
 from sensing.movingai import (
     OPTIMUM_TOLERANCE,
     Scenario,

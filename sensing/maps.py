@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +15,6 @@ BoolGrid = NDArray[np.bool_]
 
 LARGEST_MAP = 64 * 1024 * 1024
 """The greatest number of cells that a map may have; readers refuse more from the header alone."""
-
-_REPOSITORY = Path(__file__).resolve().parent.parent
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,40 +158,6 @@ def nearest_free(free: BoolGrid, cell: Cell) -> Cell:
         elif whole:
             raise AnytimeError("the map has no free cell: a robot needs at least one")
         reach *= 2
-
-
-def read_map(path: str | os.PathLike[str]) -> GridMap:
-    """Read a map file: MovingAI `.map`, or ROS `.yaml` with its image.
-
-    Raises AnytimeError, in one line with file and line, if the file is no such map.
-    """
-    from sensing import movingai, ros_maps  # they build on GridMap
-
-    readers = {
-        ".map": movingai.read_movingai,
-        ".yaml": ros_maps.read_ros_map,
-        ".yml": ros_maps.read_ros_map,
-    }
-    reader = readers.get(Path(path).suffix.lower())
-    if reader is None:
-        raise AnytimeError(f"{path}: a map file ends in .map (MovingAI) or .yaml (ROS)")
-    return reader(path)
-
-
-def map_folder() -> Path | None:
-    """Where the public maps lie: `$ANYTIME_MAPS`, else `../shared/maps`; None if absent."""
-    return _folder("ANYTIME_MAPS", "maps")
-
-
-def trace_folder() -> Path | None:
-    """Where the public traces lie: `$ANYTIME_TRACES`, else `../shared/traces`; None if absent."""
-    return _folder("ANYTIME_TRACES", "traces")
-
-
-def _folder(variable: str, name: str) -> Path | None:
-    named = os.environ.get(variable)
-    folder = Path(named) if named else _REPOSITORY.parent / "shared" / name
-    return folder if folder.is_dir() else None
 
 
 def _frozen(array: object, name: str) -> BoolGrid:
