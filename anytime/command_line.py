@@ -74,6 +74,27 @@ def positive(text: str) -> float:
     return number
 
 
+def natural(text: str) -> int:
+    """A whole number >= 0, as an argument: a seed, a count."""
+    if not (text.isascii() and text.isdigit() and len(text) <= 18):
+        raise argparse.ArgumentTypeError(f"{text[:40]!r} is not a whole number >= 0")
+    return int(text)
+
+
+def folder(text: str) -> Path:
+    """A folder to read or to make, as an argument."""
+    if Path(text).exists() and not Path(text).is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a file; give a folder")
+    return Path(text)
+
+
+def target(text: str) -> Path:
+    """A file to write, as an argument."""
+    if Path(text).is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder; give a file")
+    return Path(text)
+
+
 def resolve(reference: str) -> Any:
     """What a user means by a registered name or by FILE.py:NAME.
 
@@ -95,20 +116,34 @@ def resolve(reference: str) -> Any:
 def _from_file(file: Path, name: str) -> Any:
     if not file.is_file():
         raise AnytimeError(f"{file}: no such file; give FILE.py:NAME")
-    spec = importlib.util.spec_from_file_location(file.stem, file)
-    if spec is None or spec.loader is None:
-        raise AnytimeError(f"{file} is not a Python file; give FILE.py:NAME")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(file.stem, module)
-    sys.path.insert(0, str(file.resolve().parent))
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.pop(0)
+    module = sys.modules.get(file.stem)
+    known = getattr(module, "__file__", None)
+    if known is None or Path(known).resolve() != file.resolve():
+        module = _imported(file)
     if not hasattr(module, name):
         names = ", ".join(key for key in vars(module) if not key.startswith("_"))
         raise AnytimeError(f"{file} has no {name!r}; it has {names}"[:300])
     return getattr(module, name)
+
+
+def _imported(file: Path) -> Any:
+    """Run a user's file once, as its own folder's Python would."""
+    spec = importlib.util.spec_from_file_location(file.stem, file)
+    if spec is None or spec.loader is None:
+        raise AnytimeError(f"{file} is not a Python file; give FILE.py:NAME")
+    module = importlib.util.module_from_spec(spec)
+    named = sys.modules.setdefault(file.stem, module) is module
+    sys.path.insert(0, str(file.resolve().parent))
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        if named:
+            del sys.modules[file.stem]
+        what = str(error) if isinstance(error, AnytimeError) else f"{type(error).__name__}: {error}"
+        raise AnytimeError(f"{file} cannot be imported: {what}") from error
+    finally:
+        sys.path.pop(0)
+    return module
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from anytime.command_line import Answer, add_command, positive, progress, resolve
+from anytime.command_line import Answer, add_command, folder, natural, positive, progress, resolve
 from anytime.errors import AnytimeError
 
 
@@ -14,17 +14,29 @@ def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "profile", profile, "measure modules and fill a library")
     parser.add_argument("module", nargs="+", help="a registered name or FILE.py:NAME")
-    parser.add_argument("--library", type=Path, default=Path("profiles"), metavar="DIR")
-    parser.add_argument("--runs", type=int, default=30, metavar="N", help="problems (default 30)")
+    _add_library(parser)
+    parser.add_argument(
+        "--runs", type=natural, default=30, metavar="N", help="problems (default 30)"
+    )
     parser.add_argument("--seconds", type=positive, default=1.0, help="of each run (default 1)")
     parser.add_argument("--problems", metavar="FILE.py:NAME", help="a function (rng) -> problems")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=natural, default=0, help="of the problems and the runs")
     parser = add_command(commands, "library", library, "show the profiles of a library")
     parser.add_argument("action", nargs="?", choices=["check"], help="only check the files")
-    parser.add_argument("--library", type=Path, default=Path("profiles"), metavar="DIR")
+    _add_library(parser)
     parser = add_command(commands, "plot", plot, "draw profiles, compiled programs and logs")
-    parser.add_argument("file", nargs="+", type=Path)
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR")
+    parser.add_argument(
+        "file", nargs="+", type=Path, help=".profile, .schedule, .jsonl, or a folder of them"
+    )
+    parser.add_argument(
+        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="default: here"
+    )
+
+
+def _add_library(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--library", type=folder, default=Path("profiles"), metavar="DIR", help="default: profiles"
+    )
 
 
 def profile(options: argparse.Namespace) -> Answer:
@@ -38,22 +50,29 @@ def profile(options: argparse.Namespace) -> Answer:
 
     if options.runs < 1:
         raise AnytimeError(f"--runs {options.runs}: at least one problem is needed")
-    folder: Path = options.library
-    filled = ProfileLibrary(folder) if folder.is_dir() else ProfileLibrary()
+    kept: Path = options.library
+    filled = ProfileLibrary(kept) if kept.is_dir() else ProfileLibrary()
     for reference in options.module:
         what = resolve(reference)
         if not isinstance(what, Module | Program):
             raise AnytimeError(f"{reference} is {type(what).__name__}, not a module or program")
         source = resolve(options.problems) if options.problems else _problems(what)
-        problems = list(itertools.islice(source(np.random.default_rng(options.seed)), options.runs))
+        name = options.problems or f"problems of {what.name}"
+        try:
+            made = source(np.random.default_rng(options.seed))
+            problems = list(itertools.islice(made, options.runs))
+        except TypeError as error:
+            raise AnytimeError(
+                f"{name}: {error}; give a function (rng) that returns or yields problems"
+            ) from error
         with progress(f"measuring {what.name}") as report:
             measured = measure(
                 what, problems, seconds=options.seconds, seed=options.seed, progress=report
             )
         filled = filled.updated(measured)
-    filled.save(folder)
+    filled.save(kept)
     return Answer(
-        repr(filled), {"library": str(folder), "modules": list(filled), "problems": options.runs}
+        repr(filled), {"library": str(kept), "modules": list(filled), "problems": options.runs}
     )
 
 
@@ -77,21 +96,26 @@ def library(options: argparse.Namespace) -> Answer:
 
 
 def plot(options: argparse.Namespace) -> Answer:
-    """Draw each file as a PNG beside it, or in a folder of your choice."""
+    """Draw each file, or each file of a folder, as a PNG here or in a folder of your choice."""
     from importlib.metadata import entry_points
 
     drawn: list[str] = []
     drawers = {point.name: point for point in entry_points(group="anytime.drawings")}
+    known = ", ".join(f".{name}" for name in sorted(drawers))
+    files: list[Path] = []
+    for place in options.file:
+        inside = [file for file in sorted(place.glob("*")) if file.suffix[1:] in drawers]
+        if place.is_dir() and not inside:
+            raise AnytimeError(f"{place}: a folder with nothing to draw; drawn are {known}")
+        files += inside if place.is_dir() else [place]
     options.output.mkdir(parents=True, exist_ok=True)
-    for file in options.file:
+    for file in files:
         if not file.is_file():
             raise AnytimeError(f"{file}: no such file")
         kind = file.suffix.removeprefix(".")
         if kind not in drawers:
-            raise AnytimeError(
-                f"{file}: cannot draw .{kind}; drawn are "
-                f"{', '.join('.' + name for name in sorted(drawers))}"
-            )
+            what = f".{kind}" if kind else "a file without a suffix"
+            raise AnytimeError(f"{file}: cannot draw {what}; drawn are {known}")
         target = options.output / f"{file.name}.png"
         drawers[kind].load()(file, target)
         drawn.append(str(target))

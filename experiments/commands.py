@@ -7,7 +7,7 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command, progress
+from anytime.command_line import Answer, add_command, folder, natural, progress
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -19,17 +19,23 @@ BENCHMARKS = ("planner", "compiler", "mission")
 def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "demo", demo, "the main job, on an office that ships with us")
-    parser.add_argument("--seeds", type=int, default=100, help="missions a policy (default 100)")
-    parser.add_argument("--seed", type=int, default=0, help="of the profiles and the page")
-    parser.add_argument("--mission", type=Path, metavar="MISSION.toml")
-    parser.add_argument("-o", "--output", type=Path, default=Path(), metavar="DIR")
+    parser.add_argument(
+        "--seeds", type=natural, default=100, help="missions a policy (default 100)"
+    )
+    parser.add_argument("--seed", type=natural, default=0, help="of the profiles and the page")
+    parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="default: the office")
+    parser.add_argument(
+        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="default: here"
+    )
     parser = add_command(commands, "bench", bench, "a benchmark: " + ", ".join(BENCHMARKS))
     parser.add_argument("name", choices=BENCHMARKS)
     length = parser.add_mutually_exclusive_group()
     length.add_argument("--quick", action="store_true", help="at most 4 minutes on 2 cores")
     length.add_argument("--full", action="store_true", help="may take hours")
-    parser.add_argument("--maps", type=Path, metavar="DIR")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument(
+        "--maps", type=Path, metavar="DIR", help="MovingAI maps; default $ANYTIME_MAPS"
+    )
+    parser.add_argument("--seed", type=natural, default=0, help="of everything random")
     add_command(commands, "warm-up", warm_up, "compile the kernels, so that the first call is fast")
 
 
@@ -114,9 +120,9 @@ def _nested(figures: Any) -> dict[str, Any]:
     """Dotted names as nested objects."""
     tree: dict[str, Any] = {}
     for key, value in figures.items():
-        *folders, last = key.split(".")
+        *sections, last = key.split(".")
         place = tree
-        for folder in folders:
-            place = place.setdefault(folder, {})
+        for section in sections:
+            place = place.setdefault(section, {})
         place[last] = value
     return tree

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command
+from anytime.command_line import Answer, add_command, folder, natural, progress
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -19,14 +19,20 @@ def declare(commands: Any) -> None:
     parser = add_command(commands, "run", run, "live a monitored mission and write its page")
     parser.add_argument("mission", type=Path, metavar="MISSION.toml")
     parser.add_argument("--map", type=Path, metavar="FILE", help="another floor (.map or .yaml)")
-    parser.add_argument("--start", type=_cell, metavar="ROW,COLUMN")
+    parser.add_argument("--start", type=_cell, metavar="ROW,COLUMN", help="row 0 is the top")
     parser.add_argument("--goal", type=_cell, metavar="ROW,COLUMN")
-    parser.add_argument("--scenario", type=int, metavar="N", help="the N-th of the map's .scen")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--scenario", type=natural, metavar="N", help="the N-th of FILE.scen")
+    parser.add_argument("--seed", type=natural, default=0, help="of the mission (default 0)")
     parser.add_argument("--policy", default="expected", help="expected, paper, fixed, min or max")
-    parser.add_argument("--clock", choices=["work", "wall"], default="work")
-    parser.add_argument("--library", type=Path, metavar="DIR", help="default: shipped profiles")
-    parser.add_argument("--log", type=Path, default=Path("anytime-run"), metavar="DIR")
+    parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
+    parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
+    parser.add_argument(
+        "--log",
+        type=folder,
+        default=Path("anytime-run"),
+        metavar="DIR",
+        help="for the log and the page (default anytime-run)",
+    )
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -45,10 +51,12 @@ def run(options: argparse.Namespace) -> Answer:
     if options.scenario is not None:
         start, goal = _ends(options.map, options.scenario)
     grid = read_mission(options.mission, map_path=options.map, start=start, goal=goal)
-    folder = options.library or Path(str(files("experiments") / "data" / "profiles"))
-    briefing = brief(grid, ProfileLibrary(folder), QUICK if options.map else Effort())
+    profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
+    library = ProfileLibrary(profiles)
+    with progress("calibrating"):
+        briefing = brief(grid, library, QUICK if options.map else Effort())
+        monitor = briefing.monitor(options.policy)
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
-    monitor = briefing.monitor(options.policy)
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed, clock=clock, log=log)
     page = write_page([read_log(log)], options.log / "mission.html")
