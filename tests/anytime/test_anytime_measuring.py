@@ -1,0 +1,369 @@
+"""Measuring: which runs are made, on what, and how they are scored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+import anytime
+import compiler
+from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock
+from anytime.measuring import CHANGES, STRATA
+
+MACHINE = Machine("m")
+for _name in ("see", "find", "merge", "walk"):
+    MACHINE = MACHINE.with_rate(_name, 0.01)
+
+
+@dataclass
+class Problem:
+    image: float
+    goal: float = 1.0
+    truth: float = 1.0
+    left: float = 0.5
+    right: float = 0.25
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+def ladder(image):
+    """Eight results, each a little nearer to the image."""
+    for step in range(1, 9):
+        anytime.charge(10)
+        yield image * step / 8
+
+
+see = anytime.module(quality=lambda value, problem: value / 2, name="see")(ladder)
+
+
+@anytime.module(cost=lambda value, problem: 1 + abs(problem.goal - value))
+def find(boxes, goal, *, rng):
+    for step in range(1, 4):
+        anytime.charge(20)
+        yield boxes * step / 3 + 0.01 * rng.random()
+
+
+@anytime.module(quality=lambda value: value / 4)
+def merge(one, other):
+    anytime.charge(5)
+    yield one + other
+
+
+@compiler.program
+def navigate(image, goal):
+    return find(see(image), goal)
+
+
+@compiler.program
+def stereo(left, right):
+    return merge(see(left), see(right))
+
+
+def measured(what, problems, seconds=10.0, **options) -> ProfileLibrary:
+    return anytime.measure(
+        what, problems, seconds=seconds, clock=lambda: WorkClock(MACHINE), **options
+    )
+
+
+def problems(count=6, seed=0):
+    rng = np.random.default_rng(seed)
+    return [Problem(float(rng.random())) for _ in range(count)]
+
+
+def saved(library, folder) -> dict[str, bytes]:
+    library.save(folder)
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def test_each_module_is_run_on_what_the_one_before_really_delivers():
+    library = measured(navigate, problems())
+    assert list(library) == ["find", "see"]
+    assert library["find"].inputs == ("boxes",)
+    assert library["see"].inputs == ()
+    delivered = {float(q) for values in library["see"].qualities for q in values}
+    for run in library["find"].recordings:
+        assert run.inputs["boxes"] in delivered
+
+
+def test_a_module_runs_at_most_four_times_on_a_problem_and_on_the_last_result():
+    library = measured(navigate, problems())
+    for problem in library["find"].problems:
+        runs = [run for run in library["find"].recordings if run.problem == problem]
+        assert 1 < len(runs) <= STRATA
+        levels = sorted(run.inputs["boxes"] for run in runs)
+        last = next(run.raw[-1] for run in library["see"].recordings if run.problem == problem)
+        assert levels[-1] == last
+        assert np.diff(levels).min() > 0.5 * (levels[-1] - levels[0]) / len(levels)
+
+
+def test_several_inputs_share_those_runs_in_a_latin_square():
+    library = measured(stereo, problems())
+    for problem in library["merge"].problems:
+        pairs = [
+            (run.inputs["one"], run.inputs["other"])
+            for run in library["merge"].recordings
+            if run.problem == problem
+        ]
+        assert 2 < len(pairs) <= STRATA
+        assert len({one for one, _ in pairs}) == len({other for _, other in pairs}) == len(pairs)
+
+
+def test_a_module_that_is_called_twice_has_one_profile_with_the_call_in_its_runs():
+    library = measured(stereo, problems(3))
+    assert {run.call for run in library["see"].recordings} == {"see", "see_2"}
+    assert len(library["see"].recordings) == 6
+    assert set(library.machine.rates) >= {"see", "merge"}
+
+
+def test_measured_rates_are_those_of_all_calls_of_a_module():
+    @anytime.module(quality=lambda value: 0.5, name="walk")
+    def walk(steps):
+        for _ in range(int(steps)):
+            yield 1
+
+    @anytime.module(quality=lambda value: 0.5)
+    def both(one, other):
+        yield one + other
+
+    @compiler.program
+    def twice(image, goal):
+        return both(walk(image), walk(goal))
+
+    library = anytime.measure(twice, [Problem(image=3, goal=1)], seconds=50)
+    assert library.machine.rates["walk"].steps == 3 + 1
+
+
+def test_a_module_called_in_two_ways_is_refused():
+    @compiler.program
+    def mixed(image, goal):
+        return find(find(see(image), goal), see(goal))
+
+    with pytest.raises(AnytimeError, match="calls find in two ways"):
+        measured(mixed, problems(2))
+
+
+def test_the_truth_is_never_on_the_clock():
+    """A quality that takes long changes nothing: the profile is the same to the last bit."""
+
+    def slow(clock):
+        def quality(value, problem):
+            clock[-1].advance(1000.0)
+            return value / 2
+
+        return quality
+
+    clocks: list[WorkClock] = []
+
+    def clock():
+        clocks.append(WorkClock(MACHINE))
+        return clocks[-1]
+
+    patient = anytime.module(quality=slow(clocks), name="see")(ladder)
+    one = anytime.measure(patient, problems(), seconds=10, clock=clock)
+    other = measured(see, problems())
+    assert repr(one["see"].recordings) == repr(other["see"].recordings)
+
+
+def test_the_estimate_is_recorded_and_the_truth_is_not_asked_during_the_run():
+    inside: list[bool] = []
+
+    def quality(value):
+        try:
+            anytime.here()
+        except anytime.OutsideRunError:
+            inside.append(False)
+        else:
+            inside.append(True)
+        return value / 2
+
+    module = anytime.module(quality=quality, estimate=lambda v: v / 4, name="see")(ladder)
+    library = measured(module, problems(2))
+    assert not any(inside)
+    assert library["see"].recordings[0].estimates.max() <= 0.25
+
+
+def test_the_same_seed_gives_the_same_bytes(tmp_path):
+    first, again = (
+        saved(measured(navigate, problems(), seed=3), tmp_path / name) for name in ("a", "b")
+    )
+    assert first == again
+    other = saved(measured(navigate, problems(), seed=4), tmp_path / "c")
+    assert other["find.profile"] != first["find.profile"]
+
+
+def test_the_order_of_problems_does_not_matter(tmp_path):
+    forward = saved(measured(navigate, problems()), tmp_path / "a")
+    backward = saved(measured(navigate, problems()[::-1]), tmp_path / "b")
+    assert forward == backward
+
+
+def test_problems_have_their_names_or_a_digest_of_their_inputs():
+    @dataclass
+    class Named:
+        image: float
+        name: str
+
+    listed = [Named(0.1, "a"), Named(0.2, "a#2"), Named(0.3, "a"), Named(0.4, "a")]
+    library = measured(see, listed)
+    assert len(library["see"].problems) == 4
+    unnamed = measured(see, [Problem(0.5), Problem(0.5), Problem(0.25)])
+    assert len(unnamed["see"].problems) == 3
+
+
+def test_a_cost_is_normalised_by_the_cheapest_known_of_all_runs_of_its_problem():
+    library = measured(navigate, problems())
+    profile = library["find"]
+    for problem in profile.problems:
+        costs = [c for r in profile.recordings if r.problem == problem for c in r.raw]
+        assert profile.references[problem] == min(costs)
+        best = max(
+            float(values.max())
+            for run, values in zip(profile.recordings, profile.qualities, strict=True)
+            if run.problem == problem
+        )
+        assert best == 1.0
+
+
+def test_the_cost_of_a_module_in_the_middle_labels_the_inputs_of_the_next():
+    @anytime.module(quality=lambda value: 0.5, name="walk")
+    def walk(path):
+        anytime.charge(1)
+        yield path
+
+    @compiler.program
+    def tour(image, goal):
+        return walk(find(see(image), goal))
+
+    library = measured(tour, problems())
+    delivered = {float(q) for values in library["find"].qualities for q in values}
+    assert {run.inputs["path"] for run in library["walk"].recordings} <= delivered
+
+
+def test_costs_of_zero_and_problems_without_any_result_have_qualities_too(tmp_path):
+    @anytime.module(cost=lambda value: value, name="see")
+    def free(image):
+        anytime.charge(1)
+        if image:
+            yield image - 1
+
+    library = measured(free, [Problem(0), Problem(1), Problem(3)])
+    profile = library["see"]
+    assert sorted(q.tolist() for q in profile.qualities) == [[], [1.0], [1.0]]
+    library.save(tmp_path)
+    assert repr(ProfileLibrary(tmp_path)["see"]) == repr(profile)
+
+
+def test_where_nothing_arrives_nothing_is_run():
+    @anytime.module(quality=lambda value: 1.0, name="see")
+    def blind(image):
+        anytime.charge(1)
+        if image > 0.5:
+            yield image
+
+    @compiler.program
+    def follow(image, goal):
+        return find(blind(image), goal)
+
+    library = measured(follow, [Problem(0.2), Problem(0.9)])
+    assert len(library["see"].problems) == 2
+    assert len(library["find"].problems) == 1
+
+
+def test_a_long_run_keeps_its_first_and_last_results():
+    @anytime.module(quality=lambda value: value / 10000, name="see")
+    def many():
+        for value in range(5000):
+            anytime.charge(0.01)
+            yield value
+
+    run = measured(many, [Problem(1)])["see"].recordings[0]
+    assert len(run.raw) <= CHANGES
+    assert (run.raw[0], run.raw[-1]) == (0, 4999 / 10000)
+    assert run.complete
+
+
+def test_a_run_is_cut_at_its_time():
+    run = measured(see, [Problem(1.0)], seconds=0.35)["see"].recordings[0]
+    assert run.seconds.tolist() == pytest.approx([0.1, 0.2, 0.3])
+    assert not run.complete
+
+
+def test_features_are_those_of_the_inputs():
+    module = anytime.module(
+        quality=lambda v: v / 2, features=lambda image: {"light": image}, name="see"
+    )(ladder)
+    assert measured(module, [Problem(0.5)])["see"].recordings[0].features == {"light": 0.5}
+
+
+def test_progress_is_told():
+    told: list[tuple[int, int]] = []
+    measured(see, problems(3), progress=lambda done, total: told.append((done, total)))
+    assert told == [(1, 3), (2, 3), (3, 3)]
+
+
+# Refusals
+
+
+def test_a_problem_without_an_input_is_named_with_all_inputs():
+    with pytest.raises(AnytimeError, match=r"problems\[1\] has no \.goal; .*navigate are image, g"):
+        measured(navigate, [Problem(1.0), type("Bare", (), {"image": 1.0})()])
+
+
+def test_no_problems_and_no_time_are_refused():
+    with pytest.raises(AnytimeError, match="at least one"):
+        measured(see, [])
+    for seconds in (0.0, -1.0, float("nan")):
+        with pytest.raises(AnytimeError, match="> 0"):
+            measured(see, problems(1), seconds=seconds)
+
+
+def test_work_charged_after_an_uncharged_check_is_refused():
+    @anytime.module(quality=lambda value: 1.0, name="see")
+    def mixed():
+        yield 1
+        anytime.charge(3)
+        yield 2
+
+    with pytest.raises(AnytimeError, match="charge before the first yield"):
+        measured(mixed, [Problem(1)])
+
+
+def test_a_module_that_cannot_be_scored_says_what_to_give():
+    @anytime.module(name="see")
+    def unscored():
+        yield 1
+
+    with pytest.raises(AnytimeError, match="cannot be scored; give .*quality=….* or .*cost=…"):
+        measured(unscored, [Problem(1)])
+
+
+@pytest.mark.parametrize("score", [-0.5, 1.5, float("nan"), float("inf")])
+def test_a_quality_outside_the_unit_interval_names_module_and_problem(score):
+    module = anytime.module(quality=lambda value: score, name="see")(ladder)
+    with pytest.raises(AnytimeError, match=r"quality of 'see' is .* on problem .*\[0, 1\]"):
+        measured(module, problems(1))
+
+
+@pytest.mark.parametrize("score", [-0.5, float("nan"), float("inf")])
+def test_a_cost_is_finite_and_not_negative(score):
+    module = anytime.module(cost=lambda value: score, name="see")(ladder)
+    with pytest.raises(AnytimeError, match="finite and >= 0"):
+        measured(module, problems(1))
+
+
+def test_a_module_that_fails_before_its_first_result_is_reported():
+    @anytime.module(quality=lambda value: 1.0, name="see")
+    def broken():
+        raise OSError("no camera")
+        yield
+
+    with pytest.raises(AnytimeError, match="failed on problem .* before .* result: .*no camera"):
+        measured(broken, [Problem(1)])
+
+
+def test_a_score_may_take_the_result_alone():
+    one = measured(anytime.module(quality=lambda v: v / 2, name="see")(ladder), problems(2))
+    two = measured(see, problems(2))
+    assert repr(one["see"].recordings) == repr(two["see"].recordings)

@@ -1,0 +1,315 @@
+"""Laws of conditional performance profiles."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from anytime import AnytimeError, Profile
+from anytime.profiles import Distribution, Recording
+
+qualities = st.floats(0, 1)
+
+
+def recording(problem="a", values=(), times=None, inputs=None, features=None, end=None):
+    times = np.arange(1.0, len(values) + 1) if times is None else np.array(times, dtype=float)
+    last = float(times[-1]) if len(times) else 0.0
+    return Recording(
+        problem,
+        "see",
+        inputs or {},
+        features or {},
+        times,
+        times,
+        np.array(values, dtype=float),
+        np.full(len(values), np.nan),
+        (max(last, end or 0.0), last),
+        True,
+    )
+
+
+@st.composite
+def runs(draw, inputs=(), features=()):
+    """One run: qualities may rise and fall, and there may be none at all."""
+    values = draw(st.lists(qualities, max_size=6))
+    gaps = draw(st.lists(st.floats(0, 2), min_size=len(values), max_size=len(values)))
+    return recording(
+        draw(st.sampled_from("abcd")),
+        values,
+        np.cumsum(gaps),
+        {name: draw(qualities) for name in inputs},
+        {name: draw(st.floats(-5, 5)) for name in features},
+        draw(st.floats(0, 20)),
+    )
+
+
+@st.composite
+def profiles(draw, inputs=(), features=()):
+    recordings = draw(st.lists(runs(inputs, features), min_size=1, max_size=12))
+    return Profile("see", tuple(inputs), tuple(recordings))
+
+
+moments = st.lists(st.floats(-1, 20), min_size=1, max_size=20).map(lambda times: np.sort(times))
+
+
+@given(profiles(), moments)
+def test_expected_quality_never_falls_with_time_and_stays_in_the_unit_interval(profile, times):
+    means = profile.mean(times)
+    assert (np.diff(means) >= 0).all()
+    assert ((means >= 0) & (means <= 1)).all()
+
+
+@given(profiles(), moments)
+def test_the_envelope_is_the_best_so_far_of_what_was_measured(profile, times):
+    measured = profile.mean(times, as_measured=True)
+    assert measured == pytest.approx([profile.at(t).mean for t in times])
+    assert (profile.mean(times) >= measured - 1e-12).all()
+    every = np.unique(np.concatenate([[0.0], *(run.seconds for run in profile.recordings)]))
+    for time, mean in zip(times, profile.mean(times), strict=True):
+        before = every[every <= time]
+        best = profile.mean(before, as_measured=True).max() if len(before) else 0.0
+        assert mean == pytest.approx(best)
+
+
+def test_the_envelope_holds_between_the_moments_that_are_kept():
+    """More changes than moments: a short peak between two of them still counts afterwards."""
+    rng = np.random.default_rng(0)
+    spiky = [recording(str(i), rng.random(60), np.sort(rng.random(60))) for i in range(40)]
+    profile = Profile("see", (), tuple(spiky))
+    assert len(profile.times) <= 512
+    assert (np.diff(profile.mean(np.linspace(0, 1, 5001))) >= 0).all()
+
+
+@given(profiles(("boxes",), ("density",)), qualities, st.floats(-10, 10))
+def test_weights_sum_to_one_under_every_condition(profile, boxes, density):
+    conditions = ({}, {"boxes": boxes}, {"density": density}, {"boxes": boxes, "density": density})
+    for condition in conditions:
+        weights = profile.given(**condition).weights
+        assert weights.sum() == pytest.approx(1)
+        assert (weights >= 0).all()
+
+
+@given(profiles(), st.floats(-1, 20))
+def test_no_result_counts_nothing_and_is_told_apart_from_a_poor_one(profile, seconds):
+    distribution = profile.at(seconds)
+    reached = distribution.at_least(0.0)
+    assert reached + distribution.no_result == pytest.approx(1)
+    assert distribution.mean <= reached + 1e-12
+
+
+@given(profiles(), st.floats(0, 20), qualities, qualities)
+def test_quantiles_and_chances_are_monotone(profile, seconds, one, other):
+    low, high = sorted((one, other))
+    distribution = profile.at(seconds)
+    below, above = distribution.quantile(low), distribution.quantile(high)
+    assert np.isnan(below) or below <= above
+    assert distribution.at_least(high) <= distribution.at_least(low) + 1e-12
+    assert profile.quantile(high, seconds) == pytest.approx(above, nan_ok=True)
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
+def test_a_quantile_is_of_a_share(share):
+    with pytest.raises(AnytimeError, match=r"in \[0, 1\]"):
+        Profile("see", (), (recording(values=[0.5]),)).quantile(share, 1.0)
+
+
+@given(profiles(), qualities, st.floats(0.01, 1))
+def test_the_time_to_a_quality_is_when_that_share_of_runs_has_had_it(profile, quality, share):
+    seconds = profile.time_to(quality, share)
+    had = [
+        weight
+        for weight, run, values in zip(
+            profile.weights, profile.recordings, profile.qualities, strict=True
+        )
+        if (values[run.seconds <= seconds] >= quality).any()
+    ]
+    if np.isinf(seconds):
+        assert sum(had) < share + 1e-9
+    else:
+        assert sum(had) >= share - 1e-9
+
+
+@given(profiles(), qualities, st.floats(0, 5))
+def test_progress_is_a_distribution_of_what_came_later(profile, quality, seconds):
+    later = profile.progress(quality, seconds)
+    assert later.weights.sum() == pytest.approx(1)
+    seen = {float(value) for values in profile.qualities for value in values}
+    assert {float(value) for value in later.values if not np.isnan(value)} <= seen
+
+
+def test_progress_tells_where_runs_with_this_quality_went():
+    steady = [recording(f"p{i}", [0.2, 0.4, 0.6, 0.8]) for i in range(20)]
+    later = Profile("see", (), tuple(steady)).progress(0.4, 2.0)
+    assert later.mean == pytest.approx(0.8)
+
+
+def test_progress_of_a_profile_that_never_has_a_result_is_no_result():
+    assert Profile("see", (), (recording(),)).progress(0.5, 1.0).no_result == 1
+
+
+def test_progress_leaves_out_runs_that_the_condition_leaves_out():
+    runs_ = [recording("a", [0.5, level], inputs={"boxes": level}) for level in (0.0, 0.5, 1.0)]
+    later = Profile("see", ("boxes",), tuple(runs_)).given(boxes=1.0).progress(0.5, 1.0)
+    assert later.mean == 1.0
+
+
+@given(profiles(), moments)
+def test_the_band_contains_the_mean(profile, times):
+    low, high = profile.band(times, resamples=50)
+    for mean in (profile.mean(times), profile.mean(times, as_measured=True)):
+        assert (mean <= high + 1e-9).all()
+    assert (low <= profile.mean(times, as_measured=True) + 1e-9).all()
+    assert ((low >= 0) & (high <= 1)).all()
+
+
+def test_the_band_narrows_with_problems():
+    rng = np.random.default_rng(1)
+    runs_ = [recording(f"p{i}", [rng.random()]) for i in range(400)]
+    few, many = (Profile("see", (), tuple(runs_[:count])) for count in (10, 400))
+    width = [high[0] - low[0] for low, high in (few.band([2.0]), many.band([2.0]))]
+    assert width[1] < width[0] / 3
+
+
+# Conditions
+
+
+@given(at=qualities)
+def test_given_interpolates_between_the_strata_of_each_problem(at):
+    """Two problems, one easy and one hard, each run at its own two input qualities."""
+    runs_ = (
+        recording("easy", [0.8], inputs={"boxes": 0.0}),
+        recording("easy", [1.0], inputs={"boxes": 1.0}),
+        recording("hard", [0.0], inputs={"boxes": 0.0}),
+        recording("hard", [0.4], inputs={"boxes": 1.0}),
+    )
+    profile = Profile("find", ("boxes",), runs_).given(boxes=at)
+    assert profile.mean(5.0)[0] == pytest.approx(0.4 + 0.3 * at)
+    assert profile.effective_problems == pytest.approx(2)
+
+
+def test_given_does_not_reach_beyond_what_a_problem_was_run_on():
+    runs_ = (
+        recording("a", [0.3], inputs={"boxes": 0.4}),
+        recording("a", [0.7], inputs={"boxes": 0.6}),
+    )
+    profile = Profile("find", ("boxes",), runs_)
+    assert profile.given(boxes=0.0).mean(9)[0] == pytest.approx(0.3)
+    assert profile.given(boxes=1.0).mean(9)[0] == pytest.approx(0.7)
+
+
+def test_good_inputs_do_not_borrow_from_easy_problems():
+    """Only the easy problem had a good input; the hard one still speaks at every level."""
+    runs_ = (
+        recording("easy", [0.9], inputs={"boxes": 1.0}),
+        recording("hard", [0.1], inputs={"boxes": 0.2}),
+    )
+    assert Profile("find", ("boxes",), runs_).given(boxes=1.0).mean(9)[0] == pytest.approx(0.5)
+
+
+def test_several_inputs_are_met_exactly_where_they_were_run():
+    runs_ = tuple(
+        recording("a", [0.1 + 0.5 * a + 0.3 * b], inputs={"left": a, "right": b})
+        for a in (0.0, 1.0)
+        for b in (0.0, 1.0)
+    )
+    profile = Profile("merge", ("left", "right"), runs_)
+    assert profile.given(left=1.0, right=0.0).mean(9)[0] == pytest.approx(0.6, abs=1e-6)
+    assert 0.1 <= profile.given(left=0.5, right=0.5).mean(9)[0] <= 0.9
+
+
+def test_features_tell_easy_inputs_from_hard_ones():
+    runs_ = tuple(
+        recording(f"p{i}", [0.9 if i < 10 else 0.1], features={"density": i / 20})
+        for i in range(20)
+    )
+    profile = Profile("see", (), runs_)
+    assert profile.features == ("density",)
+    easy, hard = profile.given(density=0.1), profile.given(density=0.9)
+    assert easy.mean(9)[0] > 0.8
+    assert hard.mean(9)[0] < 0.2
+    assert easy.effective_problems < 20
+
+
+def test_a_run_that_lacks_a_feature_hardly_counts_where_it_is_asked_for():
+    runs_ = (recording("a", [0.9], features={"density": 0.5}), recording("b", [0.1]))
+    assert Profile("see", (), runs_).given(density=0.5).mean(9)[0] == pytest.approx(0.9, abs=1e-3)
+
+
+@pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), float("inf")])
+def test_the_quality_of_an_input_lies_in_the_unit_interval(value):
+    profile = Profile("find", ("boxes",), (recording(values=[0.5], inputs={"boxes": 1.0}),))
+    with pytest.raises(AnytimeError, match=r"\[0, 1\]"):
+        profile.given(boxes=value)
+
+
+def test_a_feature_asked_for_is_a_finite_number():
+    profile = Profile("see", (), (recording(values=[0.5], features={"density": 1.0}),))
+    with pytest.raises(AnytimeError, match="finite"):
+        profile.given(density=float("nan"))
+
+
+def test_an_unknown_condition_names_the_known_ones():
+    profile = Profile("find", ("boxes",), (recording(values=[0.5], inputs={"boxes": 1.0}),))
+    with pytest.raises(AnytimeError, match="not conditioned on 'see'; known: boxes"):
+        profile.given(see=0.8)
+
+
+def test_a_profile_of_no_runs_is_refused():
+    with pytest.raises(AnytimeError, match="at least one problem"):
+        Profile("see", (), ())
+
+
+# Costs
+
+
+def test_quality_of_a_cost_is_the_cheapest_known_for_the_problem_by_it():
+    runs_ = (recording("a", [10.0, 5.0]), recording("b", [8.0]), recording("c", [0.0]))
+    profile = Profile("find", (), runs_, {"a": 5.0, "b": 4.0, "c": 1.0})
+    assert [q.tolist() for q in profile.qualities] == [[0.5, 1.0], [0.5], [1.0]]
+
+
+def test_a_beaten_reference_gives_no_quality_above_one():
+    profile = Profile("find", (), (recording("a", [2.0]),), {"a": 4.0})
+    assert profile.qualities[0].tolist() == [1.0]
+
+
+# Texts and pictures
+
+
+@given(profiles(("boxes",), ("density",)), qualities)
+def test_texts_fit_a_line_and_pictures_are_drawn_for_every_profile(profile, boxes):
+    for each in (profile, profile.given(boxes=boxes), profile.given(density=1.0)):
+        assert len(repr(each)) <= 100
+        assert "\n" not in repr(each)
+    assert "<svg" in profile._repr_html_()
+
+
+def test_the_text_says_how_many_problems_a_condition_leaves():
+    runs_ = tuple(recording(f"p{i}", [0.5], features={"density": float(i)}) for i in range(9))
+    assert "n_eff" in repr(Profile("see", (), runs_).given(density=0.0))
+
+
+def test_a_distribution_is_what_its_weights_say():
+    distribution = Distribution(np.array([np.nan, 0.5, 1.0]), np.array([0.5, 0.25, 0.25]))
+    assert distribution.mean == 0.375
+    assert distribution.no_result == 0.5
+    assert np.isnan(distribution.quantile(0.5))
+    assert [distribution.quantile(share) for share in (0.6, 0.9, 1.0)] == [0.5, 1.0, 1.0]
+
+
+@given(profiles(), st.floats(0.1, 10))
+def test_a_machine_twice_as_fast_gives_the_same_quality_in_half_the_time(profile, rate):
+    from anytime import Machine
+
+    slow, fast = (
+        profile.on(Machine(name).with_rate("see", each))
+        for name, each in (("slow", 2 * rate), ("fast", rate))
+    )
+    work = np.unique(np.concatenate([[0.0], *(run.work for run in profile.recordings)]))
+    middles = (work[:-1] + work[1:]) / 2 if len(work) > 1 else work
+    assert slow.mean(2 * rate * middles) == pytest.approx(fast.mean(rate * middles))
+    assert replace(slow, machine="x", recordings=fast.recordings) == replace(fast, machine="x")
