@@ -121,7 +121,7 @@ class Profile:
         result: list[Floats] = []
         for run in self.recordings:
             reference = self.references[run.problem]
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 quality = np.where(run.raw > 0, reference / run.raw, 1.0)
             result.append(np.clip(quality, 0.0, 1.0))
         return tuple(result)

@@ -335,7 +335,7 @@ def test_a_module_that_cannot_be_scored_says_what_to_give():
     def unscored():
         yield 1
 
-    with pytest.raises(AnytimeError, match="cannot be scored; give .*quality=….* or .*cost=…"):
+    with pytest.raises(AnytimeError, match=r"cannot be scored; give .*quality=….* or .*cost=…"):
         measured(unscored, [Problem(1)])
 
 
@@ -359,7 +359,7 @@ def test_a_module_that_fails_before_its_first_result_is_reported():
         raise OSError("no camera")
         yield
 
-    with pytest.raises(AnytimeError, match="failed on problem .* before .* result: .*no camera"):
+    with pytest.raises(AnytimeError, match=r"failed on problem .* before .* result: .*no camera"):
         measured(broken, [Problem(1)])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 
 import numpy as np
@@ -18,8 +19,7 @@ MACHINE = Machine("m").with_rate("count", 1.0).with_rate("outer", 0.0).with_rate
 
 @anytime.module()
 def count():
-    for value in range(1, 6):
-        yield value
+    yield from range(1, 6)
 
 
 @anytime.module(name="search")
@@ -81,10 +81,8 @@ def test_a_bare_except_that_swallows_the_stop_is_not_complete():
     @anytime.module(name="search")
     def stubborn():
         for value in range(5):
-            try:
+            with contextlib.suppress(BaseException):
                 anytime.register(value)
-            except:  # noqa: E722
-                pass
 
     result = on_work_clock(stubborn, seconds=2)
     assert (result.status, result.value) == (Status.INTERRUPTED, 4)
