@@ -71,7 +71,7 @@ def divide(tables: Sequence[Table]) -> Frontier:
     least = float(totals[values > 0].min(initial=np.inf))
     most = float(sum(table.times[-1] for table in tables))
     if np.isfinite(least):
-        for budget in np.geomspace(least, most, BUDGETS):
+        for budget in np.geomspace(max(least, 1e-6 * most, 1e-12), max(most, 1e-12), BUDGETS):
             inside = np.flatnonzero(totals <= budget + 1e-12)
             start = moments[inside[np.argmax(values[inside])]]
             found = _exchanged(tables, tuple(int(m) for m in start), float(budget))
@@ -181,6 +181,8 @@ def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp]
     nearest: list[NDArray[np.intp]] = []
     for table in tables:
         level = np.abs(table.expected[..., None] - table.levels).argmin(axis=-1)
+        # Where it is certain: a result of quality 0 is as far from the mean as no result is.
+        level = np.where(table.chances.max(axis=-1) == 1, table.chances.argmax(axis=-1), level)
         nearest.append(level)
         least = times_to_levels(level, table.times, len(table.levels))
         factors.append(Factor((*table.feeds, table.label), least))
