@@ -19,7 +19,7 @@ def draw_schedule(source: Path, target: Path) -> None:
     import matplotlib.pyplot as plt
 
     compiled = inspect(source)
-    times = np.linspace(compiled.least, float(compiled.frontier.budgets[-1]), 300)
+    times = np.linspace(max(compiled.least, 1e-9), max(compiled.frontier.budgets[-1], 1e-6), 300)
     figure, (above, below) = plt.subplots(2, 1, figsize=(6, 6.4), sharex=True)
     above.plot(times, [compiled.promise(t) for t in times], color=COLOURS[0], label="compiled")
     above.plot(
