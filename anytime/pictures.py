@@ -36,11 +36,14 @@ def number(value: float) -> str:
 
 def duration(seconds: float) -> str:
     """A time in few characters: 79.6 ms, 1.20 s."""
+    if math.isnan(seconds):
+        return "—"
     if math.isinf(seconds):
-        return "∞"
-    if abs(seconds) < 1e-3:
+        return "∞" if seconds > 0 else "-∞"
+    # The bounds are where rounding would show 1000 of the smaller unit.
+    if abs(seconds) < 0.9995e-3:
         return f"{1e6 * seconds:.0f} µs" if seconds else "0 ms"
-    if abs(seconds) < 1:
+    if abs(seconds) < 0.99995:
         return f"{1e3 * seconds:.1f} ms"
     return f"{seconds:.2f} s"
 

@@ -117,9 +117,9 @@ def test_below_the_least_budget_there_is_no_allocation(schedule):
 @pytest.mark.parametrize("seconds", [np.nan, np.inf, -np.inf])
 def test_a_budget_is_a_finite_number_of_seconds(schedule, seconds):
     for ask in (schedule.allocate, schedule.explain, schedule.advise):
-        with pytest.raises(AnytimeError, match="finite number|NaN"):
+        with pytest.raises(AnytimeError, match=r"finite number|NaN"):
             ask(seconds)
-    with pytest.raises(AnytimeError, match="finite number|NaN"):
+    with pytest.raises(AnytimeError, match=r"finite number|NaN"):
         run(schedule, seconds)
 
 
@@ -138,7 +138,7 @@ def test_compiling_twice_gives_the_same_file(library, tmp_path):
 
 
 def test_a_faster_machine_promises_no_less(library):
-    fast = Machine("fast", {name: r for name, r in MACHINE.rates.items()})
+    fast = Machine("fast", dict(MACHINE.rates))
     for name in ("see", "find", "walk"):
         fast = fast.with_rate(name, 0.0005)
     slow, quick = (
