@@ -19,6 +19,7 @@ from monitor.rhythms import Lived, Rhythm, rhythm_of
 MakeRobot = Callable[[], Robot]
 RATIOS = 9  # quantiles kept of real over foreseen time
 BINS = 3  # of foreseen time left
+PATIENCE = 3.0  # deadlines that a mission of calibration may last
 
 
 def measure_rhythm(
@@ -39,7 +40,7 @@ def measure_rhythm(
     chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
     lived: list[Lived] = []
     longest = float(contracts.shares[:, 1:].sum(axis=1).max())
-    endless = _without_deadline(mission)
+    endless = _patient(mission)
     for time in chosen:
         shares = dict(zip(program.labels, [float(time)], strict=False))
         rest = program.labels[1:]
@@ -69,7 +70,7 @@ def calibrate(
     It lives the mission for each seed, `rounds` times, the later ones with what it learnt.
     """
     policy = Expected(mission, contracts, rhythm, Spread())
-    endless = _without_deadline(mission)
+    endless = _patient(mission)
     for _ in range(rounds):
         pairs: list[tuple[float, float]] = []
         for seed in seeds:
@@ -98,8 +99,7 @@ def spread_of(pairs: Sequence[tuple[float, float]]) -> Spread:
 
 
 def _foreseen_and_real(report: Report) -> list[tuple[float, float]]:
-    if not report:
-        return []
+    # A mission that was cut short lasted at least as long as it did.
     return [
         (frame.decision.why.seconds, report.seconds - frame.started)
         for frame in report.frames
@@ -107,9 +107,11 @@ def _foreseen_and_real(report: Report) -> list[tuple[float, float]]:
     ]
 
 
-def _without_deadline(mission: Mission) -> Mission:
-    """The mission as it would go on after its deadline."""
-    return replace(mission, value=Value("exponential", mission.value.worth, mission.value.seconds))
+def _patient(mission: Mission) -> Mission:
+    """The mission as it would go on after its deadline, up to `PATIENCE` times as long."""
+    value = mission.value
+    until = value.deadline if np.isfinite(value.deadline) else 8 * value.seconds
+    return replace(mission, value=Value("hard", value.worth, PATIENCE * until))
 
 
 def _lived(sensing: float, route: float, report: Report) -> Lived:

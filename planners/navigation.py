@@ -29,6 +29,7 @@ SLACK = 8.0  # … and this many cells beyond
 IMPASSABLE = 255
 BLOCK = 2**HIGHEST_LEVEL
 NO_PLAN = np.zeros((0, 3), np.int32)
+PATIENCE = 4  # plans that lead nowhere new before the robot makes straight for the goal
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +51,15 @@ class Place:
 class FramePlan:
     """A plan for one frame.
 
-    plan: from `start` to `sub_goal`. route_left: believed length from the sub-goal to the goal, in
-    cells. belief: what was believed when it was made. length: believed length of the frame itself.
+    plan: from `start` to `sub_goal`, on the way to `goal`. route_left: believed length from the
+    sub-goal to the goal, in cells. belief: what was believed when it was made. length: believed
+    length of the frame itself.
     """
 
     plan: MultiPath
     start: Cell
     sub_goal: Cell
+    goal: Cell
     route_left: float
     belief: Belief
 
@@ -134,7 +137,9 @@ def plan_frame(
     for step in steps(domain, start, (end[0] - top, end[1] - side)):
         plan = None
         if step.plan is not None:
-            plan = FramePlan(_moved(step.plan, top, side), place.start, end, left, belief)
+            plan = FramePlan(
+                _moved(step.plan, top, side), place.start, end, place.goal, left, belief
+            )
         yield step.work + spent, plan
         spent = 0.0
 
@@ -147,20 +152,21 @@ def _moved(plan: MultiPath, top: int, side: int) -> MultiPath:
     return replace(plan, plan=moved)
 
 
-def follow(
-    free: NDArray[np.bool_], frame: FramePlan, start: Cell, goal: Cell | None = None
-) -> Walk:
+def follow(free: NDArray[np.bool_], frame: FramePlan, start: Cell, *, insist: int = 0) -> Walk:
     """Walk a frame on the true floor with what was believed when it was planned, on a leash.
 
-    goal: walk there instead, by obstacle avoidance alone and without a leash; it arrives if a way
-    exists.
+    insist: how often plans led nowhere new. Then the robot follows none: obstacle avoidance alone
+    takes it to the sub-goal, after `PATIENCE` times to the goal, on a leash twice as long each
+    time; so it arrives in the end if a way exists.
     """
     cost = travel_cost(frame.belief)
     touched = frame.belief.touched.copy()
-    if goal is not None:
-        return walk(free, cost, touched, NO_PLAN, start, goal)
-    plan = frame.plan.plan
-    return walk(free, cost, touched, plan, start, frame.sub_goal, leash=frame.leash)
+    if not insist:
+        plan = frame.plan.plan
+        return walk(free, cost, touched, plan, start, frame.sub_goal, leash=frame.leash)
+    target = frame.sub_goal if insist < PATIENCE else frame.goal
+    leash = frame.leash * 2.0 ** min(insist, 40)
+    return walk(free, cost, touched, NO_PLAN, start, target, leash=leash)
 
 
 class FrameProblem(Protocol):

@@ -20,7 +20,7 @@ from monitor.monitoring import Monitor
 from monitor.policies import Paper, Policy, constant
 from monitor.reports import Report
 from monitor.rhythms import Rhythm
-from monitor.robots.grid import GridRobot
+from monitor.robots.grid import GridRobot, Scene
 from monitor.robots.grid_missions import GridMission
 from monitor.robots.navigation import navigate
 
@@ -36,10 +36,16 @@ class Effort:
     levels: int = 6
     rhythm_seeds: int = 8
     seeds: int = 16
-    rounds: int = 2
 
 
-QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, rounds=1)
+QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6)
+LONG = 400.0  # cells; calibration lives fewer missions that are longer than this
+
+
+def effort_for(scene: Scene) -> Effort:
+    """The effort that a scene needs: less the longer its missions are."""
+    share = min(1.0, LONG / max(scene.optimal, 1.0)) if np.isfinite(scene.optimal) else 0.0
+    return Effort(6, max(3, round(8 * share)), max(6, round(16 * share)))
 
 
 @dataclass(frozen=True)
@@ -92,7 +98,6 @@ class Briefing:
             self.rhythm,
             self.robot,
             seeds=seeds,
-            rounds=self.effort.rounds,
         )
 
     def live(
@@ -118,8 +123,9 @@ class Briefing:
         return report
 
 
-def brief(grid: GridMission, library: ProfileLibrary, effort: Effort = Effort()) -> Briefing:
+def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = None) -> Briefing:
     """Compile the paper's program for a mission's machine and measure the mission's rhythm."""
+    effort = effort or effort_for(grid.scene)
     program = compile(navigate, library.on(grid.machine))
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)

@@ -42,7 +42,7 @@ def run(options: argparse.Namespace) -> Answer:
     from anytime import ProfileLibrary, WallClock, WorkClock
     from monitor.logs import read_log
     from monitor.page import write_page
-    from monitor.robots.briefing import POLICIES, QUICK, Effort, brief
+    from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.grid_missions import read_mission
 
     if options.policy not in POLICIES:
@@ -54,7 +54,7 @@ def run(options: argparse.Namespace) -> Answer:
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
     with progress("calibrating"):
-        briefing = brief(grid, library, QUICK if options.map else Effort())
+        briefing = brief(grid, library)
         monitor = briefing.monitor(options.policy)
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
     log = options.log / "mission.jsonl"

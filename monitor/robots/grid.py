@@ -19,8 +19,6 @@ from planners.path_finding import Cell, astar, route
 from sensing import Belief
 from sensing.vision import Device, Sensor, Vision
 
-PATIENCE = 4  # fruitless frames after which the robot goes straight for the goal
-
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -133,7 +131,7 @@ class GridRobot:
         if isinstance(plan, NoWay):
             self._ending = Ending.UNREACHABLE
             return
-        walk = follow(self.scene.free, plan, self.cell, self._insistence(plan))
+        walk = follow(self.scene.free, plan, self.cell, insist=self._fruitless)
         self._plan = self._executed = plan
         self._path = walk.cells
         steps = np.abs(np.diff(walk.cells, axis=0)).sum(axis=1)
@@ -182,13 +180,6 @@ class GridRobot:
     def picture(self) -> Mapping[str, Any]:
         """What is believed of the floor now: probabilities of being blocked [rows, columns]."""
         return {"belief": self.belief.probabilities()}
-
-    def _insistence(self, plan: FramePlan) -> Cell | None:
-        """Where to go without a plan, when plans led nowhere new: each frame that ends having
-        touched no new cell makes the robot surer, so that it cannot go round in circles."""
-        if not self._fruitless:
-            return None
-        return plan.sub_goal if self._fruitless < PATIENCE else self.scene.goal
 
     def _settle(self) -> None:
         """Bring place and energy up to now."""
