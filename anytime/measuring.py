@@ -23,6 +23,7 @@ from anytime.running import Change, Result, Run, execute, seed_of
 
 STRATA = 4  # runs of a consumer on one problem, at most
 CHANGES = 64  # registrations kept of one run, at most
+CONTRACTS = 8  # times for which a contract module is run, each half of the next
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ def measure(
     problems: objects whose attributes are the inputs by name, plus what `quality` wants.
     seconds: how long each run may take. clock: makes the clock of a run; a `WorkClock` measures
     in simulated time. rest: seconds of idling before each run, as a control loop does (profiles
-    measured hot fail in a cold loop). progress: called with (problems done, problems).
+    measured hot fail in a cold loop). A contract module is run for `seconds` and for shares of it,
+    because what it gives in less time is another run. progress: called with (problems done,
+    problems).
 
     In a program, what each module really delivers feeds the next: at most `STRATA` runs a call
     and problem, on results equally spaced in achieved quality plus the last; several inputs by
@@ -98,20 +101,22 @@ def _sample(
         by_name[name] if isinstance(argument, Call) else _argument(argument, problem)
         for name, argument in zip(module.parameters, call.arguments, strict=True)
     )
-    time.sleep(rest)
-    kept: list[Any] = []
-    changes: list[Change] = []
-
-    def observe(value: Any, change: Change) -> None:
-        kept.append(value)
-        changes.append(change)
-        if len(kept) >= 4 * CHANGES:  # bounds the memory of a module that registers for ever
-            del kept[1:-1:2], changes[1:-1:2]
-
     levels = tuple(index for *_, index in fed)
-    rng = np.random.default_rng(seed_of(seed, call.label, key, levels))
-    deadline = Deadline.after(seconds, clock())
-    result, run = execute(module, inputs, deadline, rng=rng, observe=observe)
+
+    def once(budget: float) -> tuple[list[tuple[Any, Change]], Result, Run]:
+        kept: list[tuple[Any, Change]] = []
+
+        def observe(value: Any, change: Change) -> None:
+            kept.append((value, change))
+            if len(kept) >= 4 * CHANGES:  # bounds the memory of a module that registers for ever
+                del kept[1:-1:2]
+
+        time.sleep(rest)
+        rng = np.random.default_rng(seed_of(seed, call.label, key, levels))
+        deadline = Deadline.after(budget, clock())
+        return kept, *execute(module, inputs, deadline, rng=rng, observe=observe)
+
+    kept, result, run = once(seconds)
     if run.mixed:
         raise AnytimeError(
             f"module {module.name!r} charges work after a check-point that it did not charge for; "
@@ -121,12 +126,25 @@ def _sample(
         raise AnytimeError(
             f"module {module.name!r} failed on problem {key} before any result: {result.fault}"
         )
+    if module.contract:  # what it gives for less time is a run of its own
+        shorter = [once(seconds * 0.5**halvings)[0] for halvings in range(CONTRACTS - 1, 0, -1)]
+        kept = _in_order(pair for each in (*shorter, kept) for pair in each[-1:])
     if len(kept) > CHANGES:
         chosen = np.unique(np.linspace(0, len(kept) - 1, CHANGES).round().astype(int))
-        kept, changes = [kept[i] for i in chosen], [changes[i] for i in chosen]
-    raw = np.array([_scored(module, value, problem, key) for value in kept])
+        kept = [kept[i] for i in chosen]
+    raw = np.array([_scored(module, value, problem, key) for value, _ in kept])
     features = module.features(*inputs) if module.features else {}
-    return _Sample(tuple(kept), tuple(changes), raw, fed, result, run, features)
+    values, changes = tuple(value for value, _ in kept), tuple(change for _, change in kept)
+    return _Sample(values, changes, raw, fed, result, run, features)
+
+
+def _in_order(results: Iterable[tuple[Any, Change]]) -> list[tuple[Any, Change]]:
+    """The results without those that took less time or work than one before."""
+    kept: list[tuple[Any, Change]] = []
+    for value, change in results:
+        if not kept or (change.seconds >= kept[-1][1].seconds and change.work >= kept[-1][1].work):
+            kept.append((value, change))
+    return kept
 
 
 def _scored(module: Module, value: Any, problem: Any, key: str) -> float:

@@ -205,7 +205,7 @@ class CompiledProgram:
             ends = deadline.at if last else min(share_ends, deadline.at)
             hard = deadline.at - sum(table.first for table in self.tables[place + 1 :])
             held = None
-            if call.module.generator and not last:
+            if call.module.generator and not call.module.contract and not last:
                 held = guard(self.steps.get(call.module.name), ends, hard)
             if not last and not held:
                 # A share that others have used up still leaves time for a first result.
@@ -299,7 +299,7 @@ class CompiledProgram:
         return min(low, promised), max(high, promised)
 
     def _repr_html_(self) -> str:
-        times = np.linspace(*self._budgets(2), 80)
+        times = np.geomspace(self.least, float(self.frontier.budgets[-1]), 80)
         x = times.tolist()
         series = {
             "compiled": (x, [self.promise(t) for t in x]),

@@ -290,6 +290,21 @@ def test_a_run_is_cut_at_its_time():
     assert not run.complete
 
 
+def test_a_contract_module_is_measured_for_shorter_times_too():
+    @anytime.module(quality=lambda value: value, name="see")
+    def contract(image, *, seconds):
+        anytime.charge(100 * seconds * 0.4)
+        yield image * seconds
+        anytime.charge(100 * seconds * 0.4)
+        yield image * seconds
+
+    run = measured(contract, [Problem(1.0)], seconds=1.0)["see"].recordings[0]
+    budgets = 0.5 ** np.arange(7, -1, -1)
+    assert run.raw == pytest.approx(budgets)
+    assert run.seconds == pytest.approx(0.8 * budgets)
+    assert (np.diff(run.work) > 0).all()
+
+
 def test_features_are_those_of_the_inputs():
     module = anytime.module(
         quality=lambda v: v / 2, features=lambda image: {"light": image}, name="see"

@@ -255,6 +255,30 @@ def test_shares_are_soft_and_a_first_result_is_never_refused(schedule):
     assert result
 
 
+def test_a_contract_module_in_the_middle_is_told_its_share(library):
+    told: list[float] = []
+
+    @anytime.module(quality=lambda value: value, name="find")
+    def contract(boxes, goal, *, seconds):
+        told.append(seconds)
+        anytime.charge(1000 * seconds)
+        yield boxes * goal * min(1.0, 10 * seconds)
+
+    @compiler.program
+    def told_tour(image, goal):
+        return walk(contract(see(image), goal))
+
+    measured = anytime.measure(told_tour, problems(), seconds=0.4, clock=clock)
+    compiled = compiler.compile(told_tour, measured)
+    assert compiled.promise(0.3) > compiled.promise(0.08) > 0
+    for seconds in (0.08, 0.15, 0.2):
+        told.clear()
+        result = run(compiled, seconds)
+        unspent = compiled.allocate(seconds).shares["see"] - result.parts["see"].elapsed
+        assert told == [pytest.approx(compiled.allocate(seconds).shares["find"] + unspent)]
+        assert result.value >= compiled.promise(seconds) - 0.1
+
+
 def test_a_plain_function_in_the_middle_has_time_for_a_first_result(library):
     @anytime.module(quality=lambda value: value, name="find")
     def plain(boxes, goal):

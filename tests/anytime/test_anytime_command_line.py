@@ -1,0 +1,99 @@
+"""Arguments of commands: whole numbers, places, and what users mean by FILE.py:NAME."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+
+from anytime import AnytimeError
+from anytime.__main__ import main
+from anytime.command_line import folder, natural, resolve, target
+
+
+@given(some.integers(0, 10**17))
+def test_a_whole_number_is_read_back(number):
+    assert natural(str(number)) == number
+
+
+@pytest.mark.parametrize("text", ["-1", "1.5", "", "1e3", "٣", " 1", "9" * 30])
+def test_what_is_no_whole_number_is_refused_by_name(text):
+    with pytest.raises(argparse.ArgumentTypeError, match="whole number"):
+        natural(text)
+
+
+def test_a_file_is_no_folder_and_a_folder_no_file(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    assert folder(str(tmp_path)) == tmp_path
+    assert folder(str(tmp_path / "new")) == tmp_path / "new"
+    assert target(str(file)) == file
+    with pytest.raises(argparse.ArgumentTypeError, match="is a file"):
+        folder(str(file))
+    with pytest.raises(argparse.ArgumentTypeError, match="is a folder"):
+        target(str(tmp_path))
+
+
+def test_a_file_is_imported_once_so_that_its_classes_are_the_same(tmp_path):
+    file = tmp_path / "imported_once.py"
+    file.write_text("class Scene: pass\ndef scene(): return Scene()\n")
+    assert isinstance(resolve(f"{file}:scene")(), resolve(f"{file}:Scene"))
+
+
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [("import no_such_thing", "ModuleNotFoundError"), ("x = (", "SyntaxError"), ("1 / 0", "Zero")],
+)
+def test_a_file_that_cannot_be_imported_says_why_and_leaves_nothing(tmp_path, source, reason):
+    file = tmp_path / "cannot_be_imported.py"
+    file.write_text(source)
+    with pytest.raises(AnytimeError, match=reason):
+        resolve(f"{file}:x")
+    assert file.stem not in sys.modules
+
+
+def test_problems_that_are_none_are_refused_in_one_line(tmp_path, capsys):
+    file = tmp_path / "no_problems.py"
+    file.write_text(
+        "import anytime\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def see(image):\n"
+        "    yield 0.5\n"
+        "def five(rng): return 5\n"
+    )
+    kept = tmp_path / "profiles"
+    asked = ["profile", f"{file}:see", "--problems", f"{file}:five", "--library", str(kept)]
+    assert main(asked) == 2
+    told = capsys.readouterr().err
+    assert "no_problems.py:five" in told
+    assert "(rng)" in told
+    assert not kept.exists()
+
+
+def test_a_folder_with_nothing_to_draw_is_refused(tmp_path, capsys):
+    pictures = tmp_path / "pictures"
+    assert main(["plot", str(tmp_path), "-o", str(pictures)]) == 2
+    assert "nothing to draw" in capsys.readouterr().err
+    assert not pictures.exists()
+
+
+def test_every_profile_of_a_folder_is_drawn(tmp_path, capsys):
+    file = tmp_path / "drawn_module.py"
+    file.write_text(
+        "import anytime\n"
+        "from types import SimpleNamespace\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def guess(image):\n"
+        "    yield 0.5\n"
+        "    yield 1.0\n"
+        "def problems(rng): return [SimpleNamespace(image=index) for index in range(3)]\n"
+    )
+    kept = tmp_path / "profiles"
+    asked = ["profile", f"{file}:guess", "--problems", f"{file}:problems", "--library", str(kept)]
+    assert main(asked) == 0
+    capsys.readouterr()
+    assert main(["plot", str(kept), "-o", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / "guess.profile.png")]
