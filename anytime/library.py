@@ -90,7 +90,8 @@ class ProfileLibrary(Mapping[str, Profile]):
         return "\n".join([head, *(f"  {self[name]!r}"[:100] for name in self)])
 
     def _repr_html_(self) -> str:
-        return "".join(self[name]._repr_html_() for name in self) or figure("", repr(self))
+        pictures = (self[name].picture() for name in self)
+        return "".join(pictures) or figure("", repr(self))
 
 
 class _Run(Stored):

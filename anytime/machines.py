@@ -46,7 +46,7 @@ class Machine:
     """The speeds of one machine, module by module."""
 
     name: str
-    rates: Mapping[str, Rate] = field(default_factory=dict)
+    rates: Mapping[str, Rate] = field(default_factory=dict[str, Rate])
 
     def seconds(self, module: str, work: float, step: int | None = None) -> float:
         """Expected seconds of `work` units, or of the uncharged step with index `step`.

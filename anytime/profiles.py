@@ -86,9 +86,9 @@ class Profile:
     module: str
     inputs: tuple[str, ...]
     recordings: tuple[Recording, ...]
-    references: Mapping[str, float] = field(default_factory=dict)
+    references: Mapping[str, float] = field(default_factory=dict[str, float])
     machine: str = "this"
-    condition: Mapping[str, float] = field(default_factory=dict)
+    condition: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         if not self.recordings:
@@ -241,9 +241,9 @@ class Profile:
         for weight, run, values in zip(self.weights, self.recordings, self.qualities, strict=True):
             if weight <= 0:
                 continue
-            for moment, value in zip(run.seconds, values, strict=True):
+            for moment, value in zip(run.seconds.tolist(), values.tolist(), strict=True):
                 index = int(np.searchsorted(run.seconds, moment + seconds, side="right")) - 1
-                starts.append((abs(value - quality), weight / len(values), values[index]))
+                starts.append((abs(value - quality), weight / len(values), float(values[index])))
         if not starts:
             return Distribution(np.array([np.nan]), np.array([1.0]))
         starts.sort()
@@ -323,6 +323,10 @@ class Profile:
         return " | ".join(parts)[:100]
 
     def _repr_html_(self) -> str:
+        return self.picture()
+
+    def picture(self) -> str:
+        """The profile as inline SVG with its text, for a notebook."""
         times = np.linspace(0, self._horizon(), 80)
         levels: list[Profile] = [self]
         labels = ["mean"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -47,7 +47,7 @@ class Reading:
 
 
 @contextmanager
-def reading(program: str) -> Iterator[Reading]:
+def reading(program: str) -> Generator[Reading, None, None]:
     """While this is open, calling a module makes a `Call` instead of running it."""
     opened = Reading(program)
     token = calling.current.set(opened)

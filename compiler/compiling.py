@@ -32,7 +32,7 @@ def compile(
     """
     if isinstance(program, Module):
         program = program_of(program)
-    if not isinstance(program, Program):
+    if not isinstance(program, Program):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise AnytimeError(
             f"compile takes a program, not {program!r}; decorate a function with @compiler.program"
         )

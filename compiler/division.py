@@ -180,7 +180,8 @@ def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp]
     factors: list[Factor] = []
     nearest: list[NDArray[np.intp]] = []
     for table in tables:
-        level = np.abs(table.expected[..., None] - table.levels).argmin(axis=-1)
+        distance = np.abs(table.expected[..., None] - table.levels)
+        level = np.asarray(distance.argmin(axis=-1), dtype=np.intp)
         # Where it is certain: a result of quality 0 is as far from the mean as no result is.
         level = np.where(table.chances.max(axis=-1) == 1, table.chances.argmax(axis=-1), level)
         nearest.append(level)

@@ -37,7 +37,8 @@ def intervals_of(
     )
     sampled = np.zeros((RESAMPLES, len(chosen)))
     for row in range(RESAMPLES):
-        counts = Counter(rng.choice(problems, size=len(problems)).tolist())
+        drawn = rng.integers(0, len(problems), size=len(problems))
+        counts = Counter(problems[int(index)] for index in drawn)
         resampled = tables(program, profiles, counts)
         for column, index in enumerate(chosen):
             moments = moments_within(resampled, frontier.shares[index].tolist())

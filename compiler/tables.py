@@ -139,9 +139,8 @@ def _moments(profile: Profile) -> Floats:
     if len(every) <= TIMES:
         return every
     gained = profile.mean(every)
-    spaced = np.interp(
-        np.linspace(gained[0], gained[-1], TIMES // 2), gained, np.arange(len(every))
-    )
+    levels = np.linspace(float(gained[0]), float(gained[-1]), TIMES // 2)
+    spaced: Floats = np.interp(levels, gained, np.arange(len(every)))
     evenly = np.linspace(0, len(every) - 1, TIMES - TIMES // 2)
     return every[np.unique(np.concatenate([spaced, evenly]).round().astype(int))]
 

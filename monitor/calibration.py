@@ -87,7 +87,7 @@ def spread_of(pairs: Sequence[tuple[float, float]]) -> Spread:
     foreseen, real = np.array(pairs).T
     bounds = np.quantile(foreseen, np.arange(BINS) / BINS)
     bounds[0] = 0.0
-    rows = np.searchsorted(bounds, foreseen, side="right") - 1
+    rows = np.asarray(np.searchsorted(bounds, foreseen, side="right") - 1, dtype=np.intp)
     shares = (np.arange(RATIOS) + 0.5) / RATIOS
     ratios = [
         tuple(np.quantile((real / foreseen)[rows == row], shares).tolist())

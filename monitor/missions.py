@@ -94,7 +94,7 @@ class Mission:
     job: float = 0.0
     gain: float = 1.0
     name: str = "mission"
-    fixed: Mapping[str, float] = field(default_factory=dict)
+    fixed: Mapping[str, float] = field(default_factory=dict[str, float])
 
     def __post_init__(self) -> None:
         slow, fast = self.speeds

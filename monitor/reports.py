@@ -49,7 +49,7 @@ class Frame:
     driven: float
     energy: float
     interrupted: bool
-    story: Mapping[str, Any] = field(default_factory=dict)
+    story: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @property
     def decision(self) -> Decision:
