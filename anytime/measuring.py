@@ -114,7 +114,8 @@ def _sample(
         time.sleep(rest)
         rng = np.random.default_rng(seed_of(seed, call.label, key, levels))
         deadline = Deadline.after(budget, clock())
-        return kept, *execute(module, inputs, deadline, rng=rng, observe=observe)
+        result, run = execute(module, inputs, deadline, rng=rng, observe=observe)
+        return kept, result, run
 
     kept, result, run = once(seconds)
     if run.mixed:

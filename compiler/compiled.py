@@ -299,7 +299,7 @@ class CompiledProgram:
         return min(low, promised), max(high, promised)
 
     def _repr_html_(self) -> str:
-        times = np.geomspace(self.least, float(self.frontier.budgets[-1]), 80)
+        times = np.geomspace(*self._budgets(2), 80)
         x = times.tolist()
         series = {
             "compiled": (x, [self.promise(t) for t in x]),
