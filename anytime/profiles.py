@@ -241,7 +241,7 @@ class Profile:
         for weight, run, values in zip(self.weights, self.recordings, self.qualities, strict=True):
             if weight <= 0:
                 continue
-            for moment, value in zip(run.seconds.tolist(), values.tolist(), strict=True):
+            for moment, value in zip(map(float, run.seconds), map(float, values), strict=True):
                 index = int(np.searchsorted(run.seconds, moment + seconds, side="right")) - 1
                 starts.append((abs(value - quality), weight / len(values), float(values[index])))
         if not starts:

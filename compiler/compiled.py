@@ -299,7 +299,8 @@ class CompiledProgram:
         return min(low, promised), max(high, promised)
 
     def _repr_html_(self) -> str:
-        times = np.geomspace(*self._budgets(2), 80)
+        first, last = self._budgets(2)
+        times = np.geomspace(first, last, 80)
         x = times.tolist()
         series = {
             "compiled": (x, [self.promise(t) for t in x]),
