@@ -36,13 +36,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        if not error.filename:
+            return _bug(error)
+        place = error.filename2 or error.filename
+        print(f"anytime: {place}: {error.strerror or error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("anytime: interrupted", file=sys.stderr)
         return 130
     except Exception as error:
-        print(f"anytime: a bug of ours, {error!r}; report: {_report()}", file=sys.stderr)
-        return 70
+        return _bug(error)
     return answer.code
+
+
+def _bug(error: Exception) -> int:
+    print(f"anytime: a bug of ours, {error!r}; report: {_report()}", file=sys.stderr)
+    return 70
 
 
 def _report() -> str:

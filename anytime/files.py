@@ -97,7 +97,7 @@ def read_json(path: Path) -> Any:
     except (json.JSONDecodeError, RecursionError) as error:
         reason = error.msg if isinstance(error, json.JSONDecodeError) else "nested too deeply"
         line = f":{error.lineno}" if isinstance(error, json.JSONDecodeError) else ""
-        raise AnytimeError(f"{path}{line}: not JSON: {reason}") from None
+        raise AnytimeError(f"{path}{line}: not one of our files, not JSON: {reason}") from None
     except ValueError as error:
         raise AnytimeError(f"{path}: {error}") from None
     _refuse_non_finite(content, "$", path)

@@ -86,7 +86,8 @@ class ProfileLibrary(Mapping[str, Profile]):
             self.machine = read_machine(root / "machine.json")
 
     def __repr__(self) -> str:
-        head = f"library of {len(self)} profiles, machine {self.machine.name}"
+        count = f"{len(self)} profile{'s' if len(self) != 1 else ''}"
+        head = f"library of {count}, machine {self.machine.name}"
         return "\n".join([head, *(f"  {self[name]!r}"[:100] for name in self)])
 
     def _repr_html_(self) -> str:

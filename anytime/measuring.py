@@ -64,6 +64,10 @@ def measure(
     cheapest known for its problem when all of its runs are done.
     Raises AnytimeError for a problem without a needed attribute and for a module without a score.
     """
+    if not isinstance(what, Module | Program):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"measure takes a module or a program, not {what!r}")
+    if not isinstance(problems, Iterable):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"problems is {problems!r}; give a list of problems")
     program = what if isinstance(what, Program) else program_of(what)
     listed = list(problems)
     if not listed:
@@ -149,7 +153,15 @@ def _in_order(results: Iterable[tuple[Any, Change]]) -> list[tuple[Any, Change]]
 
 
 def _scored(module: Module, value: Any, problem: Any, key: str) -> float:
-    score = float(module.score(value, problem))
+    try:
+        score = float(module.score(value, problem))
+    except AnytimeError:
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise AnytimeError(
+            f"the score of {module.name!r} failed on problem {key}: {reason}"
+        ) from error
     if module.quality is not None and not 0 <= score <= 1:
         raise AnytimeError(
             f"quality of {module.name!r} is {score} on problem {key}; it must lie in [0, 1]"

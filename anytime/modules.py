@@ -69,6 +69,8 @@ class Module:
 
 
 def module(
+    function: object = None,
+    /,
     *,
     quality: Score | None = None,
     cost: Score | None = None,
@@ -86,6 +88,11 @@ def module(
     features: (*inputs) -> named numbers that tell easy inputs from hard ones.
     Raises AnytimeError for a signature that cannot be run.
     """
+    if function is not None:
+        raise AnytimeError("write @anytime.module(quality=…) or (cost=…), with parentheses")
+    for what, score in (("quality", quality), ("cost", cost), ("estimate", estimate)):
+        if score is not None and not callable(score):
+            raise AnytimeError(f"{what} must be a function of a result, not {score!r}")
     if quality is not None and cost is not None:
         raise AnytimeError("a module has a quality or a cost, not both; drop one of them")
     if callable(quality) and isinstance(quality, Module):
@@ -93,6 +100,8 @@ def module(
 
     def decorate(function: Callable[..., Any]) -> Module:
         label = name or function.__name__
+        if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
+            raise AnytimeError(f"module {label!r} is async; write a generator or a plain function")
         positional, filled = _signature(label, function)
         is_generator = inspect.isgeneratorfunction(function)
         return Module(

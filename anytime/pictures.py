@@ -30,7 +30,7 @@ def number(value: float) -> str:
         return "—"
     if abs(value) < 1:
         text = f"{value:.2f}"
-        return text.replace("0.", ".", 1) if text not in ("0.00", "1.00") else text
+        return text if text == "1.00" else text.replace("0.", ".", 1)
     return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}"
 
 
@@ -41,6 +41,8 @@ def duration(seconds: float) -> str:
     if math.isinf(seconds):
         return "∞" if seconds > 0 else "-∞"
     # The bounds are where rounding would show 1000 of the smaller unit.
+    if 0 < abs(seconds) < 0.9995e-6:
+        return f"{1e9 * seconds:.2g} ns"
     if abs(seconds) < 0.9995e-3:
         return f"{1e6 * seconds:.0f} µs" if seconds else "0 ms"
     if abs(seconds) < 0.99995:

@@ -78,10 +78,10 @@ class _Symbol:
         )
 
     def __bool__(self) -> NoReturn:
-        self._refuse("branches on (or negates)", "use compiler.branch(test, then, otherwise)")
+        self._refuse("branches on (or negates)", "do it inside a module")
 
     def __iter__(self) -> NoReturn:
-        self._refuse("iterates over", "use compiler.loop or do it inside a module")
+        self._refuse("iterates over", "do it inside a module")
 
     def __call__(self, *_: object, **__: object) -> NoReturn:
         self._refuse("calls", "only modules can be called in a program")
@@ -97,7 +97,7 @@ class _Symbol:
 
     def __eq__(self, other: object) -> bool:
         if self is not other and isinstance(calling.current.get(), Reading):
-            self._refuse("compares", "use compiler.branch(test, then, otherwise)")
+            self._refuse("compares", "do it inside a module")
         return self is other
 
     __hash__ = object.__hash__

@@ -74,7 +74,7 @@ class Result:
         return self.status is not Status.NO_RESULT
 
     def __repr__(self) -> str:
-        over = f" ({duration(self.overrun)} over)" if self.overrun > 0 else ""
+        over = f" ({duration(self.overrun)} over)" if self.overrun >= 5e-7 else ""
         estimate = self.history[-1].estimate if self.history else None
         seen = "" if estimate is None else f" {number(estimate)}"
         count = f"{len(self.history)} result{'s' if len(self.history) != 1 else ''}"
@@ -252,7 +252,10 @@ def run(
     Raises AnytimeError for inputs that do not fit the module.
     """
     if not isinstance(module, Module):  # pyright: ignore[reportUnnecessaryIsInstance]
-        raise AnytimeError(f"{module!r} is not a module; decorate it with @anytime.module(…)")
+        raise AnytimeError(
+            f"{type(module).__name__} is not a module; decorate a function with "
+            "@anytime.module(…); a compiled program has a run of its own"
+        )
     if (seconds is None) == (deadline is None):
         raise AnytimeError(f"give seconds=… or deadline=… to run {module.name!r}, one of them")
     ends = bounded(seconds, deadline)

@@ -16,7 +16,9 @@ class Robot(Protocol):
     """
 
     @property
-    def clock(self) -> Clock: ...
+    def clock(self) -> Clock:
+        """Whose time it lives in; the modules think on the same."""
+        ...
 
     def inputs(self) -> Mapping[str, Any]:
         """The program's inputs for the next frame, as seen from where the robot is now."""
@@ -55,7 +57,11 @@ class Robot(Protocol):
         ...
 
     def story(self) -> Mapping[str, Any]:
-        """What to log of the frame that just ended, as plain data."""
+        """What to log of the frame that just ended, as plain data.
+
+        `planned` and `length`, of the plan and of what was really walked, are needed for
+        calibration; `path` and `plan` are drawn.
+        """
         ...
 
     def picture(self) -> Mapping[str, Any]:

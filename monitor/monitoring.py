@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from anytime.clocks import Deadline
+from anytime.errors import AnytimeError
 from anytime.running import Fault, Result
 from compiler import CompiledProgram
 from monitor.bodies import Robot
@@ -49,8 +51,11 @@ class Monitor:
     ) -> Report:
         """Live a mission to one of the endings of the closed set.
 
-        seed: of everything random in the modules. listen: called with each frame when it is over.
+        seed: of everything random in the modules, >= 0. listen: called with each frame when it is
+        over. Raises AnytimeError for a negative seed, before anything moves.
         """
+        if seed < 0:
+            raise AnytimeError(f"seed is {seed}; it must be a whole number >= 0")
         life = _Life(self, mission, robot, seed, listen)
         fault = ""
         try:
@@ -59,7 +64,7 @@ class Monitor:
             ending = Ending.ABORTED
         except Exception as error:
             ending, fault = Ending.INTERNAL, str(Fault.of(error))
-        finally:
+        with contextlib.suppress(Exception):  # a robot that cannot even stop ends the mission too
             robot.stop()
         return life.report(ending, fault)
 
@@ -215,7 +220,9 @@ class _Life:
 
     def report(self, ending: Ending, fault: str) -> Report:
         seconds = self.time()
-        energy = self.robot.situation().energy
+        energy = sum(frame.energy for frame in self.frames)
+        with contextlib.suppress(Exception):  # else what is known of the frames that ended
+            energy = self.robot.situation().energy
         reached = ending is Ending.REACHED
         return Report(
             mission=self.mission.name,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from anytime.errors import AnytimeError
 from monitor.inter_frame import Contracts, Spread, best_contract
 from monitor.intra_frame import keep_course
 from monitor.missions import Mission
@@ -66,5 +68,13 @@ class Constant:
 
 
 def constant(shares: dict[str, float], speed: float) -> Constant:
-    """A tuned fixed division: seconds by call and a speed."""
+    """A tuned fixed division: seconds by call and a speed.
+
+    Raises AnytimeError for a negative time or a speed that does not move.
+    """
+    if not 0 < speed < math.inf:
+        raise AnytimeError(f"speed is {speed}; it must be a finite number > 0")
+    for label, seconds in shares.items():
+        if not 0 <= seconds < math.inf:
+            raise AnytimeError(f"{label} gets {seconds} s; it must be a finite number >= 0")
     return Constant(Decision(shares, speed, Why(case="fixed")))

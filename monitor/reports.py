@@ -38,7 +38,12 @@ class CallRecord:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame: sensing and planning for the next while this one is executed."""
+    """One frame: sensing and planning for the next while this one is executed.
+
+    started, ended: seconds since the task was presented. standing: there was no plan to execute.
+    moments: the decisions made in it, the first at its start. driven: seconds in motion.
+    interrupted: the plan in execution was broken off. story: what the robot tells of it.
+    """
 
     index: int
     started: float
@@ -53,6 +58,7 @@ class Frame:
 
     @property
     def decision(self) -> Decision:
+        """The decision that the frame began with."""
         return self.moments[0].decision
 
     @property

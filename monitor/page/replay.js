@@ -376,7 +376,7 @@ function draw() {
   const one = now.moments[moment];
   const again = now.moments.length > 1 ? ` · decision ${moment + 1} of ${now.moments.length}` : "";
   const sort = now.standing ? " · standing" : now.interrupted ? " · broken off" : "";
-  write("where", `Frame ${at} of ${it.frames.length - 1} · ${now.started.toFixed(2)} s – ${now.ended.toFixed(2)} s${again}${sort}`);
+  write("where", `Frame ${at}, ${it.frames.length} in all · ${now.started.toFixed(2)} s – ${now.ended.toFixed(2)} s${again}${sort}`);
   write("sentence", one.headline); write("why", one.why); write("fixed", one.fixed); write("price", one.price);
   write("here", now.here_lost); write("here-seen", now.here_seen);
   drawMap(); drawCurve(); drawShares(); drawLanes(); drawWaterfall(); drawFrames(); drawSeen(); drawRivals();

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -128,6 +129,8 @@ def read_mission(
             name=file.mission.name if not replaced else f"{file.mission.name} on {floor.name}",
             fixed=file.fixed,
         )
+        _known("machine", file.machine, REFERENCE.rates)
+        _known("fixed", file.fixed, [*REFERENCE.rates, "speed"])
         machine = REFERENCE
         for module, rate in file.machine.items():
             machine = machine.with_rate(module, rate)
@@ -148,7 +151,15 @@ def _parse(path: Path) -> _File:
     try:
         return msgspec.convert(content, _File)
     except msgspec.ValidationError as error:
-        raise AnytimeError(f"{path}: {error}") from None
+        what, _, where = str(error).partition(" - at `$.")
+        place = f"{where.rstrip('`')}: " if where else ""
+        raise AnytimeError(f"{path}: {place}{what}") from None
+
+
+def _known(table: str, given: Iterable[str], known: Iterable[str]) -> None:
+    for key in given:
+        if key not in known:
+            raise AnytimeError(f"[{table}] has no key {key!r}; it has {', '.join(known)}")
 
 
 def _device(vision: _Vision) -> Device:

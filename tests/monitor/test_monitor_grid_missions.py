@@ -35,6 +35,8 @@ def test_the_shipped_mission_is_read():
         ('kind = "parametric"', 'kind = "crystal ball"', "vision.kind"),
         ("frame = 16.0", "frame = 99.0", "half the radius"),
         ("see = 0.25", "see = -1.0", "rate"),
+        ("find_path = 0.001", "find_a_path = 0.001", "find_a_path"),
+        ("speed = 7.499", "velocity = 7.499", "velocity"),
         ("[value]", "[value", "not TOML"),
         ("../office.yaml", "../nowhere.yaml", "nowhere.yaml"),
     ],

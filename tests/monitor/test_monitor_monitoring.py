@@ -117,6 +117,21 @@ def test_a_mission_never_raises():
     assert "camera fell off" in report.fault
 
 
+def test_a_robot_that_cannot_even_stop_ends_the_mission_all_the_same():
+    class Lost(GridRobot):
+        def complete(self):
+            raise ConnectionError("no answer")
+
+        def stop(self):
+            raise ConnectionError("no answer")
+
+    robot = Lost(scene(), MISSION.energy, WorkClock(REFERENCE))
+    report = Monitor(PROGRAM, STEADY).run(MISSION, robot)
+    assert report.ending is Ending.INTERNAL
+    with pytest.raises(AnytimeError, match="seed"):
+        Monitor(PROGRAM, STEADY).run(MISSION, robot, seed=-1)
+
+
 def test_modules_that_never_have_a_result_end_the_mission():
     hasty = constant(dict(zip(PROGRAM.labels, (0.0, 0.0), strict=True)), 4.0)
     report, robot = live(scene(), policy=hasty)

@@ -150,7 +150,7 @@ def test_the_page_fits_and_answers_five_questions(browser, logs, tmp_path, width
         assert re.search(r"\d", answer), (name, answer)
     for frame in range(6):
         browser.run(f"location.hash = '#{frame}'")
-        browser.wait(f"document.getElementById('where').textContent.startsWith('Frame {frame} ')")
+        browser.wait(f"document.getElementById('where').textContent.startsWith('Frame {frame},')")
         assert browser.run("document.scrollingElement.scrollWidth <= innerWidth")
     assert browser.errors == []
 
@@ -163,22 +163,22 @@ def test_it_opens_at_the_costliest_decision_and_keys_lead_on(browser, logs, tmp_
     page = write_page(logs[:1], tmp_path / "page.html")
     browser.errors.clear()
     browser.open(page.as_uri())
-    assert where().startswith("Frame 2 of 5")
+    assert where().startswith("Frame 2, 6 in all")
     browser.press("ArrowRight")
-    assert where().startswith("Frame 3 of 5")
+    assert where().startswith("Frame 3, 6 in all")
     browser.press("ArrowLeft")
     browser.press("d")
-    assert where().startswith("Frame 2 of 5")
+    assert where().startswith("Frame 2, 6 in all")
     assert "decision 2 of 2" in where()
     browser.press("d")
-    assert where().startswith("Frame 3 of 5")
+    assert where().startswith("Frame 3, 6 in all")
     worst = [loss.index for loss in costliest(logs[0])]
     browser.run("location.hash = '#2'")
-    browser.wait("document.getElementById('where').textContent.startsWith('Frame 2 ')")
+    browser.wait("document.getElementById('where').textContent.startsWith('Frame 2,')")
     browser.press("l")
-    assert where().startswith(f"Frame {worst[1]} of 5")
+    assert where().startswith(f"Frame {worst[1]}, 6 in all")
     browser.open(page.as_uri() + "#4")
-    assert where().startswith("Frame 4 of 5")
+    assert where().startswith("Frame 4, 6 in all")
     assert browser.errors == []
 
 
@@ -247,9 +247,9 @@ def test_a_live_page_moves_on_with_the_mission(browser, live, report):
     browser.errors.clear()
     browser.open(server.url)
     where = "document.getElementById('where').textContent"
-    assert browser.run(where).startswith("Frame 0 of 0")
+    assert browser.run(where).startswith("Frame 0, 1 in all")
     writer.frame(report.frames[1])
-    browser.wait(f"{where}.startsWith('Frame 1 of 1')")
+    browser.wait(f"{where}.startsWith('Frame 1, 2 in all')")
     writer.end(report)
     browser.wait("document.getElementById('mission').textContent.includes('reached after')")
     browser.run("stop()")
