@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 from anytime.__main__ import main
+from anytime.files import _checksum, read_json
+from compiler import compile
 from experiments import shipped
+from monitor.robots.navigation import navigate
 from sensing import map_folder
 
 OFFICE = str(shipped.mission_path())
@@ -126,7 +129,26 @@ def damaged_profile(tmp_path: Path, old: str, new: str) -> list[str]:
     return ["run", OFFICE, "--library", str(folder), "--log", str(tmp_path / "run")]
 
 
+def empty_profile(tmp_path: Path) -> list[str]:
+    arguments = damaged_profile(tmp_path, "nothing", "nothing")
+    see = tmp_path / "library" / "see.profile"
+    content = read_json(see)
+    content["runs"] = []
+    del content["checksum"]
+    content["checksum"] = _checksum(content)
+    see.write_text(json.dumps(content))
+    return arguments
+
+
+def too_little_time(tmp_path: Path) -> list[str]:
+    file = tmp_path / "navigate.schedule"
+    compile(navigate, shipped.profiles()).save(file)
+    return ["explain", str(file), "--seconds", "0.000001"]
+
+
 BAD = {
+    "an empty profile": (empty_profile, "no recorded run"),
+    "a budget below the least": (too_little_time, "below the least budget"),
     "a map whose header lies": (lying_map, "lie.map"),
     "a wrong key": (wrong_key, "wort"),
     "a start inside a wall": (walled_in, "inside an obstacle"),
