@@ -72,16 +72,21 @@ def calibrate(
     policy = Expected(mission, contracts, rhythm, Spread())
     endless = _patient(mission)
     for _ in range(rounds):
-        pairs: list[tuple[float, float]] = []
-        for seed in seeds:
-            monitor = Monitor(program, policy, "expected", rhythm)
-            pairs += _foreseen_and_real(monitor.run(endless, make_robot(), seed=seed))
-        policy = Expected(mission, contracts, rhythm, spread_of(pairs))
+        monitor = Monitor(program, policy, "expected", rhythm)
+        lived = [
+            _foreseen_and_real(monitor.run(endless, make_robot(), seed=seed)) for seed in seeds
+        ]
+        policy = Expected(mission, contracts, rhythm, spread_of(lived))
     return policy
 
 
-def spread_of(pairs: Sequence[tuple[float, float]]) -> Spread:
-    """Quantiles of real / foreseen seconds left, in bins of equally many pairs."""
+def spread_of(lived: Sequence[Sequence[tuple[float, float]]]) -> Spread:
+    """Quantiles of real / foreseen seconds left, from the (foreseen, real) of each mission's frames.
+
+    In bins of equally many frames, and one of its own for the beginnings: what a mission promises
+    when it is presented is held against whole missions.
+    """
+    pairs = [pair for mission in lived for pair in mission]
     if not pairs:
         return Spread()
     foreseen, real = np.array(pairs).T
@@ -95,6 +100,11 @@ def spread_of(pairs: Sequence[tuple[float, float]]) -> Spread:
         if (rows == row).any()
     ]
     kept = [float(bounds[row]) for row in range(BINS) if (rows == row).any()]
+    begun = np.array([mission[0] for mission in lived if mission])
+    first = 0.999 * float(begun[:, 0].min())
+    if len(begun) >= RATIOS and first > kept[-1]:
+        kept.append(first)
+        ratios.append(tuple(np.quantile(begun[:, 1] / begun[:, 0], shares).tolist()))
     return Spread(tuple(kept), tuple(ratios))
 
 

@@ -132,7 +132,9 @@ def best_contract(
     """t_c = argmax VOT − COE, with the speed chosen together with it. [ZR93] §5."""
     speeds = np.geomspace(*mission.speeds, SPEEDS)
     seconds, energy = foresee(mission, contracts, rhythm, state, speeds)
-    ratios = spread.at(float(np.median(seconds)))
+    # The spread is known for what was chosen, so it is looked up where one would go without it.
+    plain = _value_and_cost(mission, state, seconds, energy, np.ones(1))
+    ratios = spread.at(float(seconds.flat[int(np.argmax(plain[0] - plain[1]))]))
     value, cost = _value_and_cost(mission, state, seconds, energy, ratios)
     net = value - cost
     row, column = (int(at) for at in np.unravel_index(int(np.argmax(net)), net.shape))

@@ -116,9 +116,16 @@ def test_rhythm_is_taken_from_missions_and_more_sensing_never_means_more_walking
 
 
 def test_the_spread_is_the_quantiles_of_real_over_foreseen():
-    pairs = [(10.0, 12.0)] * 30 + [(100.0, 90.0)] * 30 + [(200.0, 200.0)] * 30
-    spread = spread_of(pairs)
+    mission = [(200.0, 200.0)] * 10 + [(100.0, 90.0)] * 10 + [(10.0, 12.0)] * 10
+    spread = spread_of([mission] * 3)
     assert spread.at(5.0) == pytest.approx(1.2)
     assert spread.at(100.0) == pytest.approx(0.9)
     assert spread.at(1e9) == pytest.approx(1.0)
     assert spread_of([]) == Spread()
+
+
+def test_what_a_mission_promises_at_its_beginning_is_held_against_whole_missions():
+    mission = [(100.0, 130.0)] + [(90.0 - index, 90.0 - index) for index in range(80)]
+    spread = spread_of([mission] * 10)
+    assert spread.at(100.0) == pytest.approx(1.3)
+    assert spread.at(85.0) == pytest.approx(1.0)
