@@ -81,7 +81,7 @@ def calibrate(
 
 
 def spread_of(lived: Sequence[Sequence[tuple[float, float]]]) -> Spread:
-    """Quantiles of real / foreseen seconds left, from the (foreseen, real) of each mission's frames.
+    """Quantiles of real / foreseen seconds left, from the (foreseen, real) of missions' frames.
 
     In bins of equally many frames, and one of its own for the beginnings: what a mission promises
     when it is presented is held against whole missions.
