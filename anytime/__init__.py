@@ -8,7 +8,8 @@ from anytime.machines import Machine
 from anytime.measuring import measure
 from anytime.modules import Module, module
 from anytime.profiles import Profile
-from anytime.running import Result, Status, charge, expired, here, register, run
+from anytime.results import Result, Status
+from anytime.running import charge, expired, here, register, run
 
 __all__ = [
     "AnytimeError",

@@ -19,7 +19,8 @@ from anytime.machines import Machine, Rate, charged_rate, stepped_rate
 from anytime.modules import Module
 from anytime.profiles import Profile, Recording
 from anytime.programs import Call, Input, Program, program_of, upstream
-from anytime.running import Change, Result, Run, execute, seed_of
+from anytime.results import Change, Result
+from anytime.running import Run, execute, seed_of
 
 STRATA = 4  # runs of a consumer on one problem, at most
 CHANGES = 64  # registrations kept of one run, at most

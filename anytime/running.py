@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -16,75 +13,7 @@ from anytime import calling
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
-from anytime.pictures import duration, number
-
-
-class Status(Enum):
-    """What a run has to show: nothing, something, or all that it can give."""
-
-    NO_RESULT = "no result"
-    INTERRUPTED = "interrupted"
-    COMPLETE = "complete"
-
-
-class Change(NamedTuple):
-    """A registered result: when, after how much work, and what may be seen of its quality."""
-
-    seconds: float
-    work: float
-    estimate: float | None
-
-
-@dataclass(frozen=True)
-class Fault:
-    """What a module raised."""
-
-    kind: str
-    message: str
-    details: str = field(repr=False, default="")
-
-    @classmethod
-    def of(cls, error: BaseException) -> Fault:
-        return cls(type(error).__name__, str(error), "".join(traceback.format_exception(error)))
-
-    def __str__(self) -> str:
-        return f"{self.kind}: {self.message}" if self.message else self.kind
-
-
-@dataclass(frozen=True)
-class Result:
-    """The outcome of a run; truthy when there is something to use.
-
-    elapsed, overrun: seconds used, and seconds past the deadline (0 when in time).
-    history: every registration, in seconds and units of work since the start.
-    parts: of a composed program, the result of each call by its label.
-    """
-
-    status: Status
-    value: Any
-    fault: Fault | None
-    elapsed: float
-    overrun: float
-    history: tuple[Change, ...]
-    work: float = 0.0
-    parts: Mapping[str, Result] = field(default_factory=dict[str, Any])
-    why: str = ""
-
-    def __bool__(self) -> bool:
-        return self.status is not Status.NO_RESULT
-
-    def __repr__(self) -> str:
-        over = f" ({duration(self.overrun)} over)" if self.overrun >= 5e-7 else ""
-        estimate = self.history[-1].estimate if self.history else None
-        seen = "" if estimate is None else f" {number(estimate)}"
-        count = f"{len(self.history)} result{'s' if len(self.history) != 1 else ''}"
-        lines = [f"{self.status.name}{seen} after {duration(self.elapsed)}{over} · {count}"]
-        lines += [f"  {label}: {part!r}".split("\n")[0] for label, part in self.parts.items()]
-        if self.fault:
-            lines.append(f"  fault: {self.fault}")
-        if self.why:
-            lines.append(f"  {self.why}")
-        return "\n".join(line[:100] for line in lines)
+from anytime.results import Change, Fault, Result, Status
 
 
 class _Stop(BaseException):

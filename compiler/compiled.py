@@ -17,7 +17,8 @@ from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile, Recording
 from anytime.programs import Call, Input, Program
-from anytime.running import Change, Result, Run, Status, execute
+from anytime.results import Change, Result, Status
+from anytime.running import Run, execute
 from compiler import baselines
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.explaining import Advice, Explanation, advise, explain

@@ -11,7 +11,7 @@ import numpy as np
 
 from anytime.clocks import Deadline
 from anytime.errors import AnytimeError
-from anytime.running import Fault, Result
+from anytime.results import Fault, Result
 from compiler import CompiledProgram
 from monitor.bodies import Robot
 from monitor.endings import Ending
