@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import math
 import time
@@ -119,6 +120,16 @@ def test_the_measured_layout_holds_most_random_runs():
     # P(calls of "more" > n) = 0.7^n, 5 % of which are left out.
     assert layout["more"] == pytest.approx(math.log(0.05) / math.log(0.7), abs=2)
     assert layout["value"] == layout["more"] - 1
+
+
+def test_a_program_may_do_without_a_world_and_may_be_wrapped():
+    @functools.lru_cache
+    def wrapped(rng: Any) -> float:
+        return rng.uniform("x", 0.0, 2.0)
+
+    value = Problem(wrapped, None, {"x": 1}).objective()
+    assert value(np.array([0.5])) == value([0.5]) == 1.0
+    assert measured_layout(wrapped, None, np.random.default_rng(0)) == {"x": 1}
 
 
 def test_the_plain_world_holds_python_numbers_under_the_same_indices():

@@ -8,9 +8,13 @@ random vector is a random run of the program.
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import sys
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from statistics import NormalDist
 from types import SimpleNamespace
 from typing import Any
@@ -24,59 +28,69 @@ _LEAST = 1e-9
 _MOST = 1.0 - _LEAST
 
 
-class _Stretches(dict[str, Iterator[float]]):
-    """The keys that each source has left; none for a source without a stretch."""
-
-    def __missing__(self, source: str) -> Iterator[float]:
-        return iter(())
-
-
 class KeyRng:
     """Answers a program's calls from a vector of keys.
 
-    layout: calls of each source at most. Calls beyond it get a neutral value: the median, and
-    False of a flip, at which a program is expected to end.
+    layout: calls of each source at most. Calls beyond it get a neutral value: the middle of the
+    distribution, and False of a flip, at which a program is expected to end.
     """
+
+    # Each draw repeats the look-up of its key: a call of a method more would be a tenth of all.
 
     def __init__(self, layout: Mapping[str, int]) -> None:
         if not layout or min(layout.values()) < 0:
             raise AnytimeError(f"layout={dict(layout)}: give each source its calls at most, >= 0")
-        ends = np.cumsum(list(layout.values())).tolist()
-        begins = [0, *ends[:-1]]
-        self._slices = [
-            (source, slice(begin, end))
-            for source, begin, end in zip(layout, begins, ends, strict=True)
-        ]
-        self._left = _Stretches()
+        ends = list(accumulate(layout.values()))
+        self._begins = defaultdict(int, zip(layout, (0, *ends), strict=False))
+        self._ends = defaultdict(int, zip(layout, ends, strict=True))
+        self._next = self._begins.copy()
+        self._keys: Any = [0.5] * ends[-1]
         self.size: int = ends[-1]
 
     def load(self, keys: list[float]) -> None:
         """Answer the next run from these `size` keys."""
-        self._left = _Stretches([(source, iter(keys[part])) for source, part in self._slices])
+        self._keys = keys
+        self._next = self._begins.copy()
 
     def flip(self, source: str, p: float = 0.5) -> bool:
         """True with probability p."""
-        return next(self._left[source], 1.0) < p
+        at = self._next[source]
+        if at >= self._ends[source]:
+            return False
+        self._next[source] = at + 1
+        return self._keys[at] < p
 
     def randint(self, source: str, n: int) -> int:
         """An integer below n, each equally likely."""
-        key = next(self._left[source], 0.5)
+        at = self._next[source]
+        if at >= self._ends[source]:
+            return n // 2
+        self._next[source] = at + 1
+        key = self._keys[at]
         return int(key * n) if key < 1.0 else n - 1
 
     def gaussian(self, source: str, mean: float, sigma: float) -> float:
         """A normal value; keys within 1e-9 of an end give the six-sigma value there."""
-        key = next(self._left[source], 0.5)
+        at = self._next[source]
+        if at >= self._ends[source]:
+            return mean
+        self._next[source] = at + 1
+        key = self._keys[at]
         return mean + sigma * _quantile(
             key if _LEAST <= key <= _MOST else _LEAST if key < 0.5 else _MOST
         )
 
     def uniform(self, source: str, low: float, high: float) -> float:
         """A value between low and high."""
-        return low + (high - low) * next(self._left[source], 0.5)
+        at = self._next[source]
+        if at >= self._ends[source]:
+            return 0.5 * (low + high)
+        self._next[source] = at + 1
+        return low + (high - low) * self._keys[at]
 
     def categorical(self, source: str, weights: Sequence[float]) -> int:
         """An index, as likely as its weight is large."""
-        rest = next(self._left[source], 0.5) * sum(weights)
+        rest = self.uniform(source, 0.0, sum(weights))
         last = 0
         for index, weight in enumerate(weights):
             if rest < weight:
@@ -87,31 +101,48 @@ class KeyRng:
 
     def exponential(self, source: str, scale: float) -> float:
         """An exponential value of mean scale."""
-        return -scale * math.log1p(-min(next(self._left[source], 0.5), _MOST))
+        return -scale * math.log1p(-min(self.uniform(source, 0.0, 1.0), _MOST))
 
     def lognormal(self, source: str, mean: float, sigma: float) -> float:
         """The exponential of a normal value."""
         return math.exp(self.gaussian(source, mean, sigma))
 
 
-class _Count(KeyRng):
-    """A random run that counts the calls of each source."""
+class _Draws:
+    """Endless keys, each drawn when it is looked at."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+
+    def __getitem__(self, at: int) -> float:
+        return self._rng.random()
+
+
+class _Random(KeyRng):
+    """Answers from a generator, and counts the calls of each source."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         super().__init__({"": 0})
-        self.calls: dict[str, int] = {}
-        count = self
+        self._begins = self._next = defaultdict(int)
+        self._ends = defaultdict(lambda: sys.maxsize)
+        self._keys = _Draws(rng)
 
-        class Draws(_Stretches):
-            def __missing__(self, source: str) -> Iterator[float]:
-                count.calls[source] = count.calls.get(source, 0) + 1
-                return iter((rng.random(),))
+    @property
+    def calls(self) -> dict[str, int]:
+        """Of each source that was called."""
+        return dict(self._next)
 
-        self._left = Draws()
+
+def _function(model: Callable[..., float]) -> Callable[[Any, Any], float]:
+    """The bare function of (rng, world) in a model: a wrapper's work is no rival's."""
+    function = inspect.unwrap(model)
+    if len(inspect.signature(function).parameters) == 1:
+        return lambda rng, world: function(rng)
+    return function
 
 
 def measured_layout(
-    model: Callable[[Any, Any], float],
+    model: Callable[..., float],
     world: Any,
     rng: np.random.Generator,
     *,
@@ -122,11 +153,11 @@ def measured_layout(
 
     A longer vector slows every library down, a shorter one shuts plans out.
     """
-    counts = []
+    counts, function = [], _function(model)
     for _ in range(runs):
-        count = _Count(rng)
-        model(count, world)
-        counts.append(count.calls)
+        run = _Random(rng)
+        function(run, world)
+        counts.append(run.calls)
     sources = dict.fromkeys(source for calls in counts for source in calls)
     return {
         source: max(1, int(np.quantile([calls.get(source, 0) for calls in counts], share)))
@@ -155,10 +186,11 @@ def plain_world(world: Mapping[str, Any]) -> SimpleNamespace:
 class Problem:
     """A program to be optimised, lower is better, as every rival gets it.
 
-    world: what the program reads, as attributes. layout: of its random keys.
+    model: a function of rng, or of rng and the world, or a `query.model` of one. world: what it
+    reads, as attributes. layout: of its random keys.
     """
 
-    model: Callable[[Any, Any], float]
+    model: Callable[..., float]
     world: Any
     layout: Mapping[str, int]
 
@@ -167,13 +199,18 @@ class Problem:
         """Keys of a vector."""
         return sum(self.layout.values())
 
+    @property
+    def function(self) -> Callable[[Any, Any], float]:
+        """The program as a bare function of rng and the world."""
+        return _function(self.model)
+
     def objective(self) -> Callable[[Any], float]:
         """The value of a vector of keys, an array or a list."""
-        rng, model, world = KeyRng(self.layout), self.model, self.world
+        rng, function, world = KeyRng(self.layout), self.function, self.world
         load = rng.load
 
         def value(keys: Any) -> float:
             load(keys if isinstance(keys, list) else keys.tolist())
-            return model(rng, world)
+            return function(rng, world)
 
         return value

@@ -75,9 +75,9 @@ def _search(
 ) -> Trail:
     optuna = importlib.import_module("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    model, world = problem.model, problem.world
+    function, world = problem.function, problem.world
     watch = Watch(
-        lambda trial: model(TrialRng(trial, ordered=ordered), world), budget_seconds, target
+        lambda trial: function(TrialRng(trial, ordered=ordered), world), budget_seconds, target
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
