@@ -65,7 +65,7 @@ def fingerprint(scene=CROWD, every=0.1):
     nao, digest = SimulatedNao(scene), hashlib.sha256()
     for command, *arguments in COMMANDS:
         action = getattr(nao, command)(*arguments)
-        for _ in range(round(14 / every)):
+        for _ in range(round(12 / every)):
             nao.wait(every)
             outcome = action.poll()
             if abs(nao.now() / 0.5 - round(nao.now() / 0.5)) < 1e-6:
@@ -82,6 +82,7 @@ def test_it_is_a_body():
 
 def test_the_same_seed_gives_the_same_bytes_in_another_process_too():
     here = fingerprint()
+    assert fingerprint(replace(CROWD, seed=10)) != here
     path = os.pathsep.join(sys.path)
     code = f"import runpy; print(runpy.run_path({__file__!r})['fingerprint']())"
     environment = os.environ | {"PYTHONHASHSEED": "77", "PYTHONPATH": path}
@@ -94,12 +95,10 @@ def test_the_same_seed_gives_the_same_bytes_in_another_process_too():
         check=False,
     )
     assert ran.stdout.strip() == here, ran.stderr
-    assert fingerprint() == here
-    assert fingerprint(replace(CROWD, seed=10)) != here
 
 
 def test_how_often_one_looks_changes_nothing():
-    assert fingerprint(every=0.1) == fingerprint(every=0.02) == fingerprint(every=0.5)
+    assert fingerprint(every=0.1) == fingerprint(every=0.02)
 
 
 def test_reading_is_free_of_side_effects():
@@ -218,7 +217,7 @@ def test_after_closing_there_is_nobody():
 def test_standing_up_turns_it_and_odometry_tells_all_but_a_part():
     seen, hidden = [], []
     for seed in range(100):
-        nao = SimulatedNao(Scene(seed=seed), tick=0.1)
+        nao = SimulatedNao(Scene(seed=seed), tick=0.2)
         until_ended(nao, nao.posture("Stand"))
         seen.append(nao.read().pose_in_world[2])
         hidden.append(nao.true_pose_in_world[2] - seen[-1])
@@ -234,7 +233,7 @@ def test_sitting_down_does_not_turn_it():
     assert nao.true_pose_in_world == (0.0, 0.0, 0.0)
 
 
-def ends(noise, tick, runs=70):
+def ends(noise, tick, runs=80):
     """Where a metre ahead ends, true and reported, float [runs, 2, 3]."""
     told = []
     for seed in range(runs):
@@ -247,7 +246,7 @@ def ends(noise, tick, runs=70):
 def test_the_spread_after_a_metre_does_not_depend_on_the_tick():
     random = MotionNoise(scale=0.0, turning=0.0)
     noise = replace(NOISELESS, execution=random, odometry=random)
-    for tick in (0.02, 0.1):
+    for tick in (0.04, 0.2):
         found = ends(noise, tick)
         for spread in (found[:, 0].std(axis=0), (found[:, 1] - found[:, 0]).std(axis=0)):
             # heading errors add to what is sideways: 0.02² + (0.073 m)² / 3
@@ -418,7 +417,7 @@ def test_the_sonars_are_held_between_their_samples():
     assert len(set(heard)) > 5
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     st.lists(
         st.one_of(
@@ -447,7 +446,7 @@ def test_every_action_ends_and_walks_only_upright(commands):
             nao.stop()
         if nao.read().moving:
             assert nao.read().posture in UPRIGHT
-    nao.wait(40.0)
+    nao.wait(30.0)
     assert all(isinstance(action.poll(), Outcome) for action in actions)
 
 
