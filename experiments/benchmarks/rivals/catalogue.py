@@ -47,6 +47,7 @@ RIVALS = {
     "nevergrad.ngopt": Rival(("nevergrad",), vectors.nevergrad_ngopt),
     "nevergrad.de": Rival(("nevergrad",), vectors.nevergrad_de),
     "nevergrad.oneplusone": Rival(("nevergrad",), vectors.nevergrad_oneplusone),
+    "nevergrad.portfolio": Rival(("nevergrad",), vectors.nevergrad_portfolio),
     "pygad": Rival(("pygad",), vectors.pygad),
     "cma": Rival(("cma",), vectors.cma),
     "scipy.de": Rival(("scipy",), vectors.scipy_de),

@@ -28,6 +28,16 @@ _LEAST = 1e-9
 _MOST = 1.0 - _LEAST
 
 
+def normal_quantile(key: float) -> float:
+    """The standard normal value below which this share lies; six sigmas at the ends."""
+    return _quantile(min(max(key, _LEAST), _MOST))
+
+
+def exponential_quantile(key: float) -> float:
+    """The exponential value of mean 1 below which this share lies; 20.7 at the end."""
+    return -math.log1p(-min(key, _MOST))
+
+
 class KeyRng:
     """Answers a program's calls from a vector of keys.
 
@@ -76,9 +86,7 @@ class KeyRng:
             return mean
         self._next[source] = at + 1
         key = self._keys[at]
-        return mean + sigma * _quantile(
-            key if _LEAST <= key <= _MOST else _LEAST if key < 0.5 else _MOST
-        )
+        return mean + sigma * (_quantile(key) if _LEAST < key < _MOST else normal_quantile(key))
 
     def uniform(self, source: str, low: float, high: float) -> float:
         """A value between low and high."""
@@ -101,7 +109,7 @@ class KeyRng:
 
     def exponential(self, source: str, scale: float) -> float:
         """An exponential value of mean scale."""
-        return -scale * math.log1p(-min(self.uniform(source, 0.0, 1.0), _MOST))
+        return scale * exponential_quantile(self.uniform(source, 0.0, 1.0))
 
     def lognormal(self, source: str, mean: float, sigma: float) -> float:
         """The exponential of a normal value."""
