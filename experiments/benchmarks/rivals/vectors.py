@@ -18,8 +18,8 @@ from experiments.benchmarks.rivals.random_keys import Problem
 from experiments.benchmarks.rivals.trail import Restart, Stop, Trail, Watch
 
 _FOREVER = 10**9
-# A stalled population begins again after its library's patience, in evaluations: without it, half of
-# the runs of every genetic algorithm here stay in a local optimum for good.
+# A stalled search begins again after a patience, in evaluations: without it, half of the runs of
+# every genetic algorithm here stay in a local optimum for good.
 
 
 def _watched(
