@@ -151,6 +151,13 @@ def test_with_auto_stand_it_stands_up_first():
     assert nao.read().pose_in_world[0] == pytest.approx(0.2)
 
 
+def test_who_lies_does_not_walk_with_auto_stand_either():
+    wall = Obstacle((0.5, 0.0), size=(0.1, 2.0))
+    nao, _ = walked(replace(STANDS, obstacles=(wall,), auto_stand=True), 1.0, 0.0, 0.0)
+    assert nao.read().fallen
+    assert nao.walk(-0.2, 0.0, 0.0).poll() is Outcome.REFUSED
+
+
 @pytest.mark.parametrize("bad", [(math.nan, 0, 0), (math.inf, 0, 0), (1e9, 0, 0), (0, 0, -1e5)])
 def test_a_walk_that_makes_no_sense_is_refused(bad):
     assert walked(STANDS, *bad)[1] is Outcome.REFUSED
@@ -321,6 +328,7 @@ def test_walking_into_a_wall_is_a_fall_and_it_gets_up_and_walks_away():
     nao, outcome = walked(replace(STANDS, obstacles=(wall,)), 1.0, 0.0, 0.0)
     assert outcome is Outcome.FELL
     assert (nao.falls, nao.world.contacts) == (1, 1)
+    assert wall.clearance(nao.true_pose_in_world[:2]) == pytest.approx(RADIUS, abs=0.003)
     assert nao.read().fallen
     assert nao.read().posture == LYING
     fell = nao.now()

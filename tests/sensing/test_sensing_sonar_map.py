@@ -113,6 +113,14 @@ def test_what_one_sonar_alone_hears_may_be_anywhere_on_its_arc():
     assert np.hypot(found[:, 0] - 0.45, found[:, 1] - 0.3).min() < 0.2
 
 
+def test_where_nothing_was_heard_from_another_side_there_is_no_disc():
+    around = Surroundings(((0.32, 0.4, 0.1),))
+    anywhere = obstacles(heard(around, [HERE]))
+    looked = obstacles(heard(around, [HERE, (0.0, 0.0, -0.3)]))
+    bearings = [np.arctan2(found[:, 1], found[:, 0]) for found in (anywhere, looked)]
+    assert bearings[0].min() < math.radians(33) < bearings[1].min()
+
+
 def test_something_that_is_too_near_to_be_measured_is_told():
     found = obstacles(heard(Surroundings(((0.28, 0.0, 0.1),)), [HERE]))
     assert len(found)
