@@ -110,7 +110,9 @@ class SonarMap:
         return cls(log_odds, (left * cell, upper * cell), cell)
 
     def hear(self, echoes: Echoes, sonars: Sonars) -> SonarMap:
-        """The map with one more reading of both sonars in it."""
+        """The map with one more reading of both sonars; a pose that is no number says nothing."""
+        if not all(map(math.isfinite, echoes.pose_in_world)):
+            return replace(self, heard=self.heard + 1)
         log_odds = self.log_odds.copy()
         if self.echoes is not None:
             passed = max(0.0, echoes.time - self.echoes.time)
@@ -120,8 +122,8 @@ class SonarMap:
         arcs = [arc for arc in self.arcs if echoes.time - arc.time < MEMORY]
         for side, cone in enumerate(sonars.cones(echoes.pose_in_world)):
             told = echoes.ranges[side]
-            if not told > 0 or not math.isfinite(cone.x + cone.y + cone.bearing):
-                continue  # nothing is said; so NaN is
+            if not told > 0:
+                continue  # it says nothing; nor does NaN
             arc = _arc(cone, told, sonars.ranger, self.cell, side, echoes.time)
             self._hear(log_odds, arc, sonars.ranger.farthest)
             for old in [old for old in arcs if old.stand == arc.stand]:
@@ -135,8 +137,10 @@ class SonarMap:
     def centred(self, x: float, y: float, within: float = 1.0) -> SonarMap:
         """The map shifted so that the place is in its middle; as it is, if it is so `within` m.
 
-        What leaves the map is forgotten.
+        What leaves the map is forgotten. A place that is no number shifts nothing.
         """
+        if not (math.isfinite(x) and math.isfinite(y)):
+            return self
         rows, columns = self.log_odds.shape
         side = self.cell * columns, self.cell * rows
         middle = self.corner[0] + side[0] / 2, self.corner[1] - side[1] / 2

@@ -74,6 +74,8 @@ def test_a_robot_that_does_not_know_where_it_is_learns_nothing():
     known = EMPTY.hear(Echoes(0.0, (math.nan, 0.0, 0.0), (0.5, 0.5)), SONARS)
     assert (known.log_odds == EMPTY.log_odds).all()
     assert len(obstacles(known)) == 0
+    lost = Recorded((Echoes(0.0, (math.nan, math.inf, 0.0), (0.5, 0.5)),))
+    assert anytime.run(sonar_map, lost, seconds=5.0).status is Status.COMPLETE
 
 
 def test_hearing_leaves_the_map_that_was_as_it_was():
