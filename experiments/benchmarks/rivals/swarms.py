@@ -160,7 +160,7 @@ def adaptive_swarms(
     """Multi-swarm whose number of swarms adapts: one more when all have converged.
 
     [Blackwell 2007], as DEAP's example `pso/multiswarm.py` has it: no swarm is quantum but just
-    after a change, and of more than `excess` swarms that roam the worst is dropped. DEAP's excess is
+    after a change, and of more than `excess` swarms that roam the worst is dropped. DEAP's is
     3; 1 is a tenth better on scenario 2.
     """
     state = _Swarms(course, rng, 1, particles)
