@@ -19,6 +19,7 @@ WIDEST = 0.1
 
 _STEPS = 25  # bearings that are tried across a cone
 _OUTWARD = np.radians([20.0, 40.0, 60.0, 80.0])  # and out of it, from the ends of its arc
+_TOUCHING = 0.1  # metres from a sonar on NAO's chest to what touches its arms or feet
 _GRAZE = 0.04  # metres by which a disc may reach into a cone unheard
 _DOUBT = 0.5  # echoes by which a disc that is as good as the best may be worse
 _REFUTED = 2  # later readings that contradict a disc which is gone: one may be a lost echo
@@ -92,9 +93,14 @@ def _candidates(arc: Arc) -> Array:
     aside = np.concatenate([across, beyond])[:, None]
     outward = np.concatenate([across, beyond + np.array([*-_OUTWARD, *_OUTWARD])])[:, None]
     radius = np.array(RADII)[None, :]
-    x = cone.x + arc.told * np.cos(cone.bearing + aside) + radius * np.cos(cone.bearing + outward)
-    y = cone.y + arc.told * np.sin(cone.bearing + aside) + radius * np.sin(cone.bearing + outward)
-    return np.column_stack([x.ravel(), y.ravel(), np.broadcast_to(radius, x.shape).ravel()])
+    # what is too near to be measured may be anywhere up to there
+    distances = np.linspace(min(_TOUCHING, arc.told), arc.told, 4) if arc.blurred else [arc.told]
+    found: list[Array] = []
+    for far in distances:
+        x = cone.x + far * np.cos(cone.bearing + aside) + radius * np.cos(cone.bearing + outward)
+        y = cone.y + far * np.sin(cone.bearing + aside) + radius * np.sin(cone.bearing + outward)
+        found.append(np.column_stack([x.ravel(), y.ravel(), np.broadcast_to(radius, x.shape).flat]))
+    return np.concatenate(found)
 
 
 def _chain(discs: Array, score: Array) -> list[tuple[float, float, float]]:

@@ -248,17 +248,21 @@ class SimulatedNao:
         return POSTURES[best] if self._share[best] > 1 - 1e-9 else UNKNOWN
 
     def _go(self, x: float, y: float, turn: float) -> _Motions:
-        """Walk on a straight line, after half of the step phase and before the other half."""
+        """Walk on a straight line, after half of the step phase and before the other half.
+
+        Who is walking already, goes on without the first.
+        """
         if x == y == turn == 0.0:
             return Outcome.DONE
         if self._posture() not in _UPRIGHT:
             yield from self._take(STAND)
         self._walking = True
-        body = self.body
+        body, phase = self.body, self.body.step_phase / 2
+        starts = 0.0 if self._way or self._turned else phase
         seconds = max(math.hypot(x, y) / body.speed, abs(turn) / body.turn_rate)
-        done, ticks = 0.0, math.ceil((seconds + body.step_phase) / self._tick - 1e-9)
+        done, ticks = 0.0, self._ticks_of(starts + seconds + phase)
         for count in range(1, ticks + 1):
-            passed = (count * self._tick - body.step_phase / 2) / seconds
+            passed = (count * self._tick - starts) / seconds
             share = min(max(passed, 0.0), 1.0)
             if x > 0 and min(self._heard) <= self.scene.secure:
                 return Outcome.FAILED

@@ -211,6 +211,22 @@ def test_a_new_command_takes_the_place_of_the_old_one():
     assert nao.read().pose_in_world[0] == pytest.approx(here, abs=0.003)
 
 
+def test_who_walks_already_goes_on_without_starting_anew():
+    nao, body = SimulatedNao(STANDS), Body()
+    nao.walk(1.0, 0.0, 0.0)
+    nao.wait(3.0)
+    before = nao.read().pose_in_world[0]
+    nao.walk(0.0, 0.5, 0.0)
+    nao.wait(2.0)
+    x, y, _ = nao.read().pose_in_world
+    assert (x, y) == pytest.approx((before, 2.0 * body.speed), abs=0.005)
+    nao.stop()
+    nao.wait(0.1)
+    nao.walk(0.0, 0.5, 0.0)
+    nao.wait(2.0)
+    assert nao.read().pose_in_world[1] - y == pytest.approx(1.4 * body.speed, abs=0.005)
+
+
 def test_after_closing_there_is_nobody():
     nao = SimulatedNao(STANDS)
     action = nao.walk(1.0, 0.0, 0.0)

@@ -123,10 +123,16 @@ def test_where_nothing_was_heard_from_another_side_there_is_no_disc():
     assert bearings[0].min() < math.radians(33) < bearings[1].min()
 
 
-def test_something_that_is_too_near_to_be_measured_is_told():
+def test_what_is_too_near_to_be_measured_is_told_between_the_touch_and_the_range():
     found = obstacles(heard(Surroundings(((0.28, 0.0, 0.1),)), [HERE]))
-    assert len(found)
-    assert (np.hypot(found[0, 0] - 0.28, found[0, 1]) - found[0, 2]) < 0.1
+    assert 0.13 < (np.hypot(found[:, 0], found[:, 1]) - found[:, 2]).min() < 0.25
+    assert (np.abs(found[:, 1]) < found[:, 2]).all()
+
+
+def test_what_was_measured_before_it_came_too_near_is_still_known():
+    poses = [(0.02 * step, 0.0, 0.0) for step in range(11)]
+    found = obstacles(heard(AHEAD, poses))
+    assert (found[:, 0] - found[:, 2]).min() == pytest.approx(0.4, abs=0.03)
 
 
 def test_an_obstacle_that_is_taken_away_is_unlearned_at_once_and_its_return_learnt():
