@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -51,19 +53,37 @@ class WorkClock:
     def __init__(self, machine: Machine, start: float = 0.0) -> None:
         self.machine = machine
         self._now = start
+        self._beside: list[Callable[[float], None]] = []
 
     def now(self) -> float:
         return self._now
 
     def spend(self, module: str, work: float, step: int | None) -> None:
         if work:  # nothing costs nothing, for a module without a rate as well
-            self._now += self.machine.seconds(module, work, step)
+            self._pass(self.machine.seconds(module, work, step))
 
     def advance(self, seconds: float) -> None:
         """Let `seconds` pass. Raises AnytimeError for a negative or non-finite time."""
         if not 0 <= seconds < math.inf:
             raise AnytimeError(f"time cannot advance by {seconds} s; give a finite number >= 0")
+        self._pass(seconds)
+
+    @contextmanager
+    def beside(self, work: Callable[[float], None]) -> Generator[None]:
+        """While this is open, call `work(seconds)` whenever so much time has passed.
+
+        So background work is interleaved by whoever lets time pass; nothing runs in threads.
+        """
+        self._beside.append(work)
+        try:
+            yield
+        finally:
+            self._beside.remove(work)
+
+    def _pass(self, seconds: float) -> None:
         self._now += seconds
+        for work in tuple(self._beside):
+            work(seconds)
 
 
 @dataclass(frozen=True)

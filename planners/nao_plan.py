@@ -7,13 +7,16 @@ is the distance from the goal that it leaves plus the effort that it takes.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from anytime.errors import AnytimeError
+from planners import query
 from planners.nao import CROUCH, POSTURES, STAND, STAND_INIT, STAND_ZERO, Body
+from planners.query import Address
 
 WAIT, WALK, TURN, POSTURE = range(4)
 """The actions: wait(ms), walk(x, y), turn(a), posture(name)."""
@@ -80,7 +83,7 @@ def plan_world(
 
 def standing(posture: int) -> bool:
     """Whether NAO can walk from this posture."""
-    return posture == STAND or posture == STAND_INIT or posture == STAND_ZERO  # noqa: PLR1714
+    return posture in (STAND, STAND_INIT, STAND_ZERO)
 
 
 def first_contact(x: float, y: float, dx: float, dy: float, w: Any) -> tuple[float, int]:
@@ -107,50 +110,142 @@ def first_contact(x: float, y: float, dx: float, dy: float, w: Any) -> tuple[flo
     return share, which
 
 
-def plan(rng: Any, w: Any) -> float:
-    """A plan of any length, and what it costs: metres from the goal plus effort."""
-    x, y, heading, posture = w.x, w.y, w.heading, w.posture
-    behind = w.elapsed
-    seconds = 0.0
-    while rng.flip("more", 0.7):
-        action = rng.randint("action", 4)
-        dx, dy, angle, target, takes = 0.0, 0.0, 0.0, posture, 0.0
-        if action == WAIT:
-            takes = rng.randint("wait", 1000) * 0.001
-        elif action == WALK:
-            ahead, left = rng.gaussian("walk", 0.0, 1.0), rng.gaussian("walk", 0.0, 1.0)
-            if standing(posture):
-                c, s = math.cos(heading), math.sin(heading)
-                dx, dy = c * ahead - s * left, s * ahead + c * left
-                takes = math.sqrt(dx * dx + dy * dy) / w.speed + w.step_phase
-        elif action == TURN:
-            a = rng.gaussian("turn", 0.0, 1.0)
-            if standing(posture):
-                angle = a
-                takes = abs(angle) / w.turn_rate + w.step_phase
-        else:
-            target = rng.randint("posture", 6)
-            takes = w.posture_seconds[posture, target]
-        if behind >= takes:  # executed: the pose and the posture of the world contain it
-            behind -= takes
-            continue
-        rest = 1.0 - behind / takes
-        behind = 0.0
-        dx, dy, angle = rest * dx, rest * dy, rest * angle
-        seconds += rest * takes
-        if not standing(posture) and standing(target):
-            heading += w.drift
-        posture = target
-        heading += angle
-        share, hit = first_contact(x, y, dx, dy, w)
-        if hit < 0:
-            x, y = x + dx, y + dy
-            continue
-        posture = CROUCH
-        if w.collision == TELEPORTS:
-            x, y = w.obstacles[hit, 0], w.obstacles[hit, 1]
-        else:
-            x, y = x + share * dx, y + share * dy
-            seconds += w.fall_seconds
+def perform(
+    x: float,
+    y: float,
+    heading: float,
+    posture: int,
+    behind: float,
+    seconds: float,
+    action: int,
+    ahead: float,
+    left: float,
+    w: Any,
+) -> tuple[float, float, float, int, float, float]:
+    """One action: where it leads, and the seconds that it takes.
+
+    ahead, left: what the action is told: wait (seconds, –), walk (x, y) in the robot's frame at its
+    start, turn (angle, –), posture (number, –). behind: seconds of the plan that are executed
+    already: an action that lies in them is skipped, one that reaches out of them in part, for the
+    world's pose and posture contain what was done ([PRP16] §4). A walk or a turn needs a standing
+    posture; otherwise nothing happens.
+    """
+    dx, dy, angle, target, takes = 0.0, 0.0, 0.0, posture, 0.0
+    if action == WAIT:
+        takes = ahead
+    elif action == WALK:
+        if standing(posture):
+            c, s = math.cos(heading), math.sin(heading)
+            dx, dy = c * ahead - s * left, s * ahead + c * left
+            takes = math.sqrt(dx * dx + dy * dy) / w.speed + w.step_phase
+    elif action == TURN:
+        if standing(posture):
+            angle = ahead
+            takes = abs(angle) / w.turn_rate + w.step_phase
+    else:
+        target = int(ahead)
+        takes = w.posture_seconds[posture, target]
+    if behind >= takes:
+        return x, y, heading, posture, behind - takes, seconds
+    rest = 1.0 - behind / takes
+    dx, dy, angle = rest * dx, rest * dy, rest * angle
+    seconds += rest * takes
+    if not standing(posture) and standing(target):
+        heading += w.drift
+    heading += angle
+    share, hit = first_contact(x, y, dx, dy, w)
+    if hit < 0:
+        return x + dx, y + dy, heading, target, 0.0, seconds
+    if w.collision == TELEPORTS:
+        return w.obstacles[hit, 0], w.obstacles[hit, 1], heading, CROUCH, 0.0, seconds
+    seconds += w.fall_seconds
+    return x + share * dx, y + share * dy, heading, CROUCH, 0.0, seconds
+
+
+def objective(x: float, y: float, seconds: float, w: Any) -> float:
+    """Metres from the goal, plus the effort of the seconds that it takes. [PRP16] §3."""
     ex, ey = x - w.goal_x, y - w.goal_y
     return math.sqrt(ex * ex + ey * ey) + w.effort * seconds
+
+
+@query.model
+def plan(rng: Any, w: Any) -> float:
+    """A plan of any length, and what it costs. [PRP16] §3."""
+    x, y, heading, posture = w.x, w.y, w.heading, w.posture
+    behind, seconds = w.elapsed, 0.0
+    while rng.flip("more", 0.7):
+        action = rng.randint("action", 4)
+        ahead, left = 0.0, 0.0
+        if action == WAIT:
+            ahead = rng.randint("wait", 1000) * 0.001
+        elif action == WALK:
+            ahead, left = rng.gaussian("walk", 0.0, 1.0), rng.gaussian("walk", 0.0, 1.0)
+        elif action == TURN:
+            ahead = rng.gaussian("turn", 0.0, 1.0)
+        else:
+            ahead = float(rng.randint("posture", 6))
+        x, y, heading, posture, behind, seconds = perform(
+            x, y, heading, posture, behind, seconds, action, ahead, left, w
+        )
+    return objective(x, y, seconds, w)
+
+
+@dataclass(frozen=True)
+class Action:
+    """One action of a plan: "wait" (seconds), "walk" (x, y), "turn" (angle) or "posture"."""
+
+    name: str
+    ahead: float
+    left: float = 0.0
+
+    def __str__(self) -> str:
+        if self.name == "posture":
+            return f"posture {POSTURES[int(self.ahead)]}"
+        told = f"{self.ahead:.2f}, {self.left:.2f}" if self.name == "walk" else f"{self.ahead:.2f}"
+        return f"{self.name} ({told})"
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the robot is expected: metres and radians in world, a posture, seconds from now."""
+
+    x: float
+    y: float
+    heading: float
+    posture: int
+    seconds: float
+
+
+def actions_of(choices: Mapping[Address, Any]) -> tuple[Action, ...]:
+    """The actions that a plan's choices stand for."""
+    values: dict[str, list[Any]] = {}
+    for (source, _), value in choices.items():
+        values.setdefault(source, []).append(value)
+    told = {source: iter(found) for source, found in values.items()}
+    actions: list[Action] = []
+    for action in values.get("action", []):
+        if action == WAIT:
+            actions.append(Action("wait", next(told["wait"]) * 0.001))
+        elif action == WALK:
+            actions.append(Action("walk", next(told["walk"]), next(told["walk"])))
+        elif action == TURN:
+            actions.append(Action("turn", next(told["turn"])))
+        else:
+            actions.append(Action("posture", float(next(told["posture"]))))
+    return tuple(actions)
+
+
+def trajectory(actions: Iterable[Action], world: Mapping[str, Any]) -> tuple[Pose, ...]:
+    """Where a plan leads in a world, by the model's own simulation: the pose now, and after each
+    action."""
+    w = query.plain(world)
+    x, y, heading, posture = w.x, w.y, w.heading, w.posture
+    behind, seconds = w.elapsed, 0.0
+    poses = [Pose(x, y, heading, posture, 0.0)]
+    for action in actions:
+        number = ("wait", "walk", "turn", "posture").index(action.name)
+        x, y, heading, posture, behind, seconds = perform(
+            x, y, heading, posture, behind, seconds, number, action.ahead, action.left, w
+        )
+        poses.append(Pose(x, y, heading, posture, seconds))
+    return tuple(poses)

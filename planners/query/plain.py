@@ -1,0 +1,171 @@
+"""`rng` in plain Python: for a debugger, for coverage, or where a model stays plain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planners.query import genetics
+from planners.query.errors import ModelError
+from planners.query.genetics import KINDS
+from planners.query.memory import Memory
+from planners.query.reading import Text, two_kinds
+
+
+class Sources:
+    """The names that a model has used so far, their numbers and their distributions."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.memory = memory
+        self.numbers: dict[str, int] = {}
+        self.kinds: dict[str, str] = {}
+        self.at_root: dict[str, int] = {}  # streams that have room, by source
+
+    def expect(self, text: Text) -> None:
+        """Number what a model's text names, as its native form has it."""
+        for name in text.names:
+            self.number(name)
+        for name, kind in text.sources.items():
+            self.stream(-1, name, kind)
+
+    def number(self, name: str) -> int:
+        """The number of a source or path name; a new one is written down."""
+        return self.numbers.setdefault(name, len(self.numbers))
+
+    def stream(self, path: int, name: str, kind: str) -> int:
+        """The stream of a source below a path, or LOST while there is no room for it."""
+        if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise ModelError(f"the name of a source is {name!r}; give a string")
+        if self.kinds.setdefault(name, kind) != kind:
+            raise two_kinds(name, self.kinds[name], kind)
+        found = genetics.stream_of(self.memory.address, path, self.number(name), -1)
+        if path == -1 and found >= 0:
+            self.at_root[name] = found
+        return found
+
+    def locate(self, address: tuple[str, int], kind: str) -> int:
+        """The cell of an address like ("plan/3/walk", 0); the tables grow if need be."""
+        *path, name = address[0].split("/") if address[0] not in self.kinds else [address[0]]
+        while True:
+            stream = self._descend(path, name, kind)
+            cell = genetics.cell_of(self.memory.address, stream, address[1], KINDS.index(kind))
+            if cell >= 0:
+                return cell
+            for field in ("most_streams",) if stream < 0 else ("width", "most_cells"):
+                self.memory.grow(field)
+
+    def _descend(self, path: Sequence[str], name: str, kind: str) -> int:
+        at = -1
+        for scope, index in zip(path[::2], path[1::2], strict=True):
+            at = genetics.stream_of(self.memory.address, at, self.number(scope), int(index))
+        return self.stream(at, name, kind)
+
+    def address_of(self, cell: int) -> tuple[tuple[str, int], str]:
+        """The address of a cell, and its distribution."""
+        blocks = self.memory.blocks
+        stream, index, kind = (int(n) for n in blocks["homes"][cell])
+        names = list(self.numbers)
+        parts: list[str] = []
+        parent, number, place = (int(n) for n in blocks["streams"][stream])
+        parts.append(names[number])
+        while parent >= 0:
+            parent, number, place = (int(n) for n in blocks["streams"][parent])
+            parts += [str(place), names[number]]
+        return ("/".join(reversed(parts)), index), KINDS[kind]
+
+
+class Rng:
+    """Answers a model's requests for choices, which it draws, or takes from a query's genomes.
+
+    `Rng(seed)` draws everything: `model(Rng(7), world)` is one random plan.
+    """
+
+    __slots__ = ("_address", "_path", "_sources")
+
+    def __init__(self, seed: int) -> None:
+        memory = Memory(1, 8)
+        memory["random"] = seed % 2**64
+        genetics.breed(memory.address, 0)
+        self._sources, self._address, self._path = Sources(memory), memory.address, -1
+
+    @classmethod
+    def of(cls, sources: Sources, path: int = -1) -> Rng:
+        """The one that a query's models get."""
+        made = cls.__new__(cls)
+        made._sources, made._address, made._path = sources, sources.memory.address, path
+        return made
+
+    def at(self, name: str, index: int = 0) -> Rng:
+        """A place below: its choices have addresses like "plan/3/walk"."""
+        if index < 0:
+            raise ValueError("rng.at(name, index) was asked with an index < 0")
+        number = self._sources.number(name)
+        path = genetics.stream_of(self._address, self._path, number, int(index))
+        return Rng.of(self._sources, path)
+
+    def flip(self, source: str, p: float = 0.5) -> bool:
+        """True with probability p."""
+        return genetics.flip(self._address, self._stream(source, "flip"), float(p))
+
+    def randint(self, source: str, n: int) -> int:
+        """An integer in [0, n), each as probable."""
+        return genetics.randint(self._address, self._stream(source, "randint"), int(n))
+
+    def gaussian(self, source: str, mean: float = 0.0, sigma: float = 1.0) -> float:
+        """Normally distributed."""
+        stream = self._stream(source, "gaussian")
+        return genetics.gaussian(self._address, stream, float(mean), float(sigma))
+
+    def uniform(self, source: str, low: float = 0.0, high: float = 1.0) -> float:
+        """Uniform between low and high."""
+        stream = self._stream(source, "uniform")
+        return genetics.uniform(self._address, stream, float(low), float(high))
+
+    def categorical(self, source: str, weights: Sequence[float]) -> int:
+        """The place of one of the weights, in proportion to it."""
+        stream = self._stream(source, "categorical")
+        return genetics.categorical(self._address, stream, np.array(weights, np.float64))
+
+    def exponential(self, source: str, scale: float = 1.0) -> float:
+        """Exponentially distributed with this mean."""
+        stream = self._stream(source, "exponential")
+        return genetics.exponential(self._address, stream, float(scale))
+
+    def lognormal(self, source: str, mean: float = 0.0, sigma: float = 1.0) -> float:
+        """exp of a normal variable with this mean and deviation."""
+        stream = self._stream(source, "lognormal")
+        return genetics.lognormal(self._address, stream, float(mean), float(sigma))
+
+    def _stream(self, source: str, kind: str) -> int:
+        if self._path == -1 and self._sources.kinds.get(source) == kind:
+            known = self._sources.at_root.get(source)
+            if known is not None:
+                return known
+        return self._sources.stream(self._path, source, kind)
+
+
+class Replay:
+    """An `rng` that gives the choices it was given, in pure Python. See `Model.replay`."""
+
+    def __init__(self, choices: Any, path: str = "", counts: dict[str, int] | None = None) -> None:
+        self._choices = choices
+        self._path = path
+        self._counts: dict[str, int] = {} if counts is None else counts
+
+    def at(self, name: str, index: int = 0) -> Replay:
+        return Replay(self._choices, f"{self._path}{name}/{index}/", self._counts)
+
+    def _take(self, source: str, *parameters: Any) -> Any:
+        name = self._path + source
+        index = self._counts.get(name, 0)
+        self._counts[name] = index + 1
+        if (name, index) not in self._choices:
+            raise ModelError(
+                f"the model asks for ({name!r}, {index}), which is not among the choices: another "
+                "model, or a world in which it goes another way"
+            )
+        return self._choices[name, index]
+
+    flip = randint = gaussian = uniform = categorical = exponential = lognormal = _take

@@ -1,0 +1,356 @@
+"""Optimisation queries: the choices with which a model returns the least. [PRP16] §2, §4."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from anytime.clocks import Clock, Deadline, WorkClock
+from anytime.errors import AnytimeError
+from planners.query import genetics
+from planners.query.choices import Address, Choices, Solution
+from planners.query.errors import NativeError
+from planners.query.memory import Memory
+from planners.query.models import Model
+from planners.query.operators import Operators
+from planners.query.plain import Rng, Sources
+from planners.query.reading import Text
+from planners.query.worlds import World
+
+CHUNK = 4
+"""Generations between two looks at the world and at who waits."""
+
+_LONGEST = 8192  # choices: a longer run is invalid, and the tables do not grow for it
+
+
+class Query:
+    """Searches for the choices with which a model returns the least, as long as it is let.
+
+    world: what the model is evaluated in, a mapping of names to numbers and arrays; the query's
+    own `world` may be changed at any time. population: individuals, beside the scouts. native: None
+    means compiled; False runs the model plain. All of it can be used from several threads.
+    Raises ModelError for a model that asks a source for two distributions, NativeError for one
+    that has no native form.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        world: Mapping[str, Any] | None = None,
+        *,
+        population: int = 60,
+        seed: int = 0,
+        operators: Operators | None = None,
+        native: bool = True,
+    ) -> None:
+        if not isinstance(model, Model):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"{model!r} is no model; decorate a function with @query.model")
+        islands = (operators or Operators()).islands
+        if population < 4 * islands or population % islands:
+            raise AnytimeError(
+                f"population={population}; give a multiple of the {islands} islands, 4 each or more"
+            )
+        self.model = model
+        self.operators = operators or Operators()
+        self.world = World(world)
+        self._native = model.native(self.world) if native else None
+        self._memory = _memory(population, seed, self.operators)
+        self._sources = Sources(self._memory)
+        if (text := _text(model)) is not None:
+            self._sources.expect(text)
+        self._turns = Turns()
+        self._best: Solution | None = None
+
+    @property
+    def evaluations(self) -> int:
+        """How often the model was run so far."""
+        return self._memory["evaluations"]
+
+    @property
+    def generations(self) -> int:
+        """How many generations there were so far."""
+        return self._memory["generation"]
+
+    @property
+    def size(self) -> int:
+        """Evaluations of a generation: the population and the scouts."""
+        return self._memory["size"]
+
+    @property
+    def best(self) -> Solution:
+        """The best of the last generation, valued in the world that it saw.
+
+        Raises AnytimeError before the first generation.
+        """
+        with self._turns.take():
+            if self._best is None:
+                self._best = self._solution(self._memory["best"])
+            return self._best
+
+    @property
+    def value(self) -> float:
+        """The value of the best; inf before the first generation."""
+        return self._value(self._memory["best"])
+
+    def step(self, generations: int = 1, until: float = -math.inf) -> int:
+        """Make some generations; fewer if the best value comes to `until`. How many were made."""
+        made = 0
+        while made < generations:
+            with self._turns.take():
+                self.world.take_over()
+                done = self._evolve(min(CHUNK, generations - made), until)
+                self._best = None
+                made += done
+                if self.value <= until:
+                    break
+        return made
+
+    @contextmanager
+    def background(self, clock: Clock | None = None) -> Generator[Query]:
+        """Search while the block runs: a control loop, a mission.
+
+        On the wall clock in a thread, without Python's lock while a native model is evaluated. On a
+        work clock no thread starts: whenever time passes there, the query makes the evaluations
+        that its model's rate on the clock's machine allows, in whole generations, and keeps the
+        rest for the next time. What a model raises is raised when the block ends.
+        Raises AnytimeError if the machine has no rate for the model.
+        """
+        if isinstance(clock, WorkClock):
+            each = clock.machine.seconds(self.model.name, 1.0)
+            with clock.beside(_Share(self, each)):
+                yield self
+            return
+        worker = _Worker(self)
+        worker.start()
+        try:
+            yield self
+        finally:
+            worker.end()
+
+    def run(
+        self,
+        seconds: float = math.inf,
+        *,
+        evaluations: float = math.inf,
+        until: float = -math.inf,
+    ) -> Solution:
+        """Search until the time is up, the evaluations are spent or the value is reached.
+
+        Zero or negative seconds mean stop now; what was found before is returned.
+        Raises AnytimeError if none of the three is given, or nothing was found.
+        """
+        if seconds == math.inf and evaluations == math.inf and until == -math.inf:
+            raise AnytimeError(
+                "give seconds=…, evaluations=… or until=…: a query never ends itself"
+            )
+        deadline = Deadline.after(seconds)
+        last = self.evaluations + evaluations
+        while not deadline.expired() and self.evaluations + self.size <= last:
+            self.step(1, until)
+            if self.value <= until:
+                break
+        return self.best
+
+    def constrain(self, choices: Mapping[Address, Any]) -> None:
+        """From now on these choices are made as given, and no others are constrained.
+
+        What a robot has executed stays: `query.constrain(query.best.choices.first(3))`. A choice
+        outside the range that the model asks for is drawn anew nevertheless.
+        Raises AnytimeError for an address that the model never asked for.
+        """
+        with self._turns.take():
+            fixed = [(self._cell(address), value) for address, value in choices.items()]
+            self._memory.blocks["fixed"][:] = np.nan
+            for cell, value in fixed:
+                self._memory.blocks["fixed"][cell] = float(value)
+            self._memory["constrained"] = int(bool(fixed))
+
+    def value_of(self, choices: Mapping[Address, Any]) -> float:
+        """What the model returns for these choices in the newest world; others are drawn."""
+        with self._turns.take():
+            self.world.take_over()
+            return self._valued(choices)
+
+    # --- One generation after the other.
+
+    def _evolve(self, generations: int, until: float) -> int:
+        memory = self._memory
+        if self._native is None:
+            done = self._evolve_plain(generations, until)
+        else:
+            done = genetics.evolve(
+                memory.address, self._native.address, self.world.address, generations, until
+            )
+        self._grow()
+        return done
+
+    def _evolve_plain(self, generations: int, until: float) -> int:
+        memory, world = self._memory, self.world.plain
+        for done in range(generations):
+            for row in range(memory["size"]):
+                self._evaluate_plain(row, world)
+            genetics.close(memory.address)
+            if memory["grow"] or self._value(memory["best"]) <= until:
+                return done + 1
+        return generations
+
+    def _evaluate_plain(self, row: int, world: Any) -> None:
+        genetics.breed(self._memory.address, row)
+        value = self.model(Rng.of(self._sources), world)
+        genetics.settle(self._memory.address, row, float(value))
+
+    def _grow(self) -> None:
+        memory, reasons = self._memory, self._memory["grow"]
+        if not reasons:
+            return
+        if reasons & genetics.FEW_STREAMS:
+            memory.grow("most_streams")
+        if reasons & genetics.FEW_CELLS:
+            memory.grow("most_cells")
+        if reasons & genetics.NARROW and memory["width"] < _LONGEST:
+            memory.grow("width")
+        if reasons & genetics.SHORT and memory["longest"] < _LONGEST:
+            memory.grow("longest")
+        memory["grow"] = 0
+
+    # --- What the tables hold.
+
+    def _value(self, row: int) -> float:
+        memory = self._memory
+        return float(memory.blocks["values"][memory["side"] * (memory["size"] + 1) + row])
+
+    def _solution(self, row: int) -> Solution:
+        memory, blocks = self._memory, self._memory.blocks
+        if memory["generation"] == 0:
+            raise AnytimeError("nothing was found yet; call step or run first")
+        at = memory["side"] * (memory["size"] + 1) + row
+        values: dict[Address, Any] = {}
+        kinds: dict[Address, str] = {}
+        for cell in blocks["logs"][at, : blocks["lengths"][at]]:
+            address, kind = self._sources.address_of(int(cell))
+            values[address] = _typed(kind, float(blocks["genomes"][at, cell]))
+            kinds[address] = kind
+        return Solution(self._value(row), Choices(values, kinds))
+
+    def _cell(self, address: Address) -> int:
+        source, index = address
+        kind = self._sources.kinds.get(source.rsplit("/", 1)[-1] if "/" in source else source)
+        kind = self._sources.kinds.get(source, kind)
+        if kind is None or index < 0:
+            known = ", ".join(self._sources.kinds)
+            raise AnytimeError(f"the model has no choice ({source!r}, {index}); it asks {known}")
+        return self._sources.locate((source, index), kind)
+
+    def _valued(self, choices: Mapping[Address, Any]) -> float:
+        """Run the model once beside the populations: in the spare row of the children."""
+        memory = self._memory
+        cells = {self._cell(address): float(value) for address, value in choices.items()}
+        kept = {name: memory[name] for name in ("random", "evaluations", "constrained")}
+        row = memory["size"]
+        memory["constrained"] = 0
+        genetics.prepare(memory.address, row)
+        genome = memory.blocks["genomes"][(1 - memory["side"]) * (row + 1) + row]
+        for cell, value in cells.items():
+            genome[cell] = value
+        if self._native is None:
+            value = float(self.model(Rng.of(self._sources), self.world.plain))
+        else:
+            value = genetics.call(memory.address, self._native.address, self.world.address)
+        for name, before in kept.items():
+            memory[name] = before
+        self._grow()
+        return math.inf if math.isnan(value) else value
+
+
+class Turns:
+    """A lock that is handed on in the order of asking, so that a search that takes it again and
+    again keeps nobody waiting for longer than one turn."""
+
+    def __init__(self) -> None:
+        self._gate = threading.Lock()
+        self._lock = threading.Lock()
+
+    @contextmanager
+    def take(self) -> Generator[None]:
+        with self._gate:
+            self._lock.acquire()
+        try:
+            yield
+        finally:
+            self._lock.release()
+
+
+class _Worker(threading.Thread):
+    """Makes generations until it is told to end."""
+
+    def __init__(self, query: Query) -> None:
+        super().__init__(name=f"query {query.model.name}", daemon=True)
+        self._query = query
+        self._over = threading.Event()
+        self._error: BaseException | None = None
+
+    def run(self) -> None:
+        try:
+            while not self._over.is_set():
+                self._query.step()
+        except BaseException as error:
+            self._error = error
+
+    def end(self) -> None:
+        self._over.set()
+        self.join()
+        if self._error is not None:
+            raise self._error
+
+
+class _Share:
+    """Spends time that passes on a work clock on whole generations, and keeps the rest."""
+
+    def __init__(self, query: Query, seconds_per_evaluation: float) -> None:
+        self._query = query
+        self._each = seconds_per_evaluation
+        self._owed = 0.0
+
+    def __call__(self, seconds: float) -> None:
+        generation = self._query.size * self._each
+        self._owed += seconds
+        generations = int(self._owed / generation)
+        if generations:
+            self._owed -= generations * generation
+            self._query.step(generations)
+
+
+def _text(model: Model) -> Text | None:
+    """The text of a model, or None of one that can only be plain."""
+    try:
+        return model.text
+    except NativeError:
+        return None
+
+
+def _memory(population: int, seed: int, operators: Operators) -> Memory:
+    scouts = round(population * operators.scouts)
+    memory = Memory(population + scouts, 8, operators.islands)
+    memory["main"] = population
+    memory["kept"] = max(1, round(population // operators.islands * operators.elites))
+    memory["scouts_kept"] = min(scouts, max(1, round(scouts * operators.elites)))
+    memory["random"] = seed % 2**64
+    memory["calm"] = 1.0
+    for name in ("crossover", "line", "difference", "cloud", "pair", "structure", "immigrants"):
+        memory[name] = getattr(operators, name)
+    memory["mutations"], memory["exclusion"] = operators.mutations, operators.exclusion
+    memory["smallest_step"], memory["largest_step"] = operators.steps
+    memory["restart"] = operators.restart
+    memory["adaptive"], memory["dormant"] = int(operators.adaptive), int(operators.dormant)
+    return memory
+
+
+def _typed(kind: str, value: float) -> Any:
+    if kind == "flip":
+        return value != 0.0
+    return int(value) if kind in ("randint", "categorical") else value
