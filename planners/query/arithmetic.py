@@ -80,14 +80,6 @@ def _atan2(y: float, x: float) -> float:
 
 
 @njit
-def _fmod(x: float, y: float) -> float:
-    x, y = float(x), float(y)
-    if (math.isinf(x) and y == y) or (y == 0.0 and x == x):
-        raise ValueError("math domain error")
-    return math.fmod(x, y)
-
-
-@njit
 def _degrees(x: float) -> float:
     return float(x) * (180.0 / math.pi)
 
@@ -113,7 +105,6 @@ MODULE = _module(
         "fabs": _fabs,
         "copysign": _copysign,
         "atan2": _atan2,
-        "fmod": _fmod,
         "degrees": _degrees,
         "radians": _radians,
     },

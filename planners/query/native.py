@@ -115,13 +115,13 @@ def _number(rng, source):
 
 @overload_method(RngType, "at", prefer_literal=True)
 @overload_method(PathType, "at", prefer_literal=True)
-def _at(rng, name, index=0):
+def _at(rng, name, place=0):
     number = _number(rng, name)
 
-    def at(rng, name, index=0):
-        if index < 0:
-            raise ValueError("rng.at(name, index) was asked with an index < 0")
-        return _below(rng, genetics.stream_of(_address(rng), _path(rng), number, np.int64(index)))
+    def at(rng, name, place=0):
+        if place < 0:
+            raise ValueError("rng.at(name, place) was asked with a place < 0")
+        return _below(rng, genetics.stream_of(_address(rng), _path(rng), number, np.int64(place)))
 
     return at
 
@@ -284,7 +284,8 @@ def _explained(text: Text, error: NumbaError) -> str:
     ]
     name = text.functions[-1].original.__name__
     where = f"{places[-1][0]}:{places[-1][1]}: {name}" if places else name
-    telling = [line.strip() for line in message.splitlines() if _telling(line)]
+    raised = re.findall(r"(?:Typing|Value)Error: (.+)", message)  # by our own overloads, first
+    telling = [*raised, *(line.strip() for line in message.splitlines() if _telling(line))]
     return (
         f"{where}: {telling[0] if telling else 'no native form'}; write it otherwise, or use "
         "Query(…, native=False)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import index
 from typing import Any
 
 import numpy as np
@@ -58,14 +59,14 @@ class Sources:
 
     def _descend(self, path: Sequence[str], name: str, kind: str) -> int:
         at = -1
-        for scope, index in zip(path[::2], path[1::2], strict=True):
-            at = genetics.stream_of(self.memory.address, at, self.number(scope), int(index))
+        for scope, place in zip(path[::2], path[1::2], strict=True):
+            at = genetics.stream_of(self.memory.address, at, self.number(scope), int(place))
         return self.stream(at, name, kind)
 
     def address_of(self, cell: int) -> tuple[tuple[str, int], str]:
         """The address of a cell, and its distribution."""
         blocks = self.memory.blocks
-        stream, index, kind = (int(n) for n in blocks["homes"][cell])
+        stream, call, kind = (int(n) for n in blocks["homes"][cell])
         names = list(self.numbers)
         parts: list[str] = []
         parent, number, place = (int(n) for n in blocks["streams"][stream])
@@ -73,7 +74,7 @@ class Sources:
         while parent >= 0:
             parent, number, place = (int(n) for n in blocks["streams"][parent])
             parts += [str(place), names[number]]
-        return ("/".join(reversed(parts)), index), KINDS[kind]
+        return ("/".join(reversed(parts)), call), KINDS[kind]
 
 
 class Rng:
@@ -97,12 +98,12 @@ class Rng:
         made._sources, made._address, made._path = sources, sources.memory.address, path
         return made
 
-    def at(self, name: str, index: int = 0) -> Rng:
+    def at(self, name: str, place: int = 0) -> Rng:
         """A place below: its choices have addresses like "plan/3/walk"."""
-        if index < 0:
-            raise ValueError("rng.at(name, index) was asked with an index < 0")
+        if place < 0:
+            raise ValueError("rng.at(name, place) was asked with a place < 0")
         number = self._sources.number(name)
-        path = genetics.stream_of(self._address, self._path, number, int(index))
+        path = genetics.stream_of(self._address, self._path, number, index(place))
         return Rng.of(self._sources, path)
 
     def flip(self, source: str, p: float = 0.5) -> bool:
@@ -111,7 +112,7 @@ class Rng:
 
     def randint(self, source: str, n: int) -> int:
         """An integer in [0, n), each as probable."""
-        return genetics.randint(self._address, self._stream(source, "randint"), int(n))
+        return genetics.randint(self._address, self._stream(source, "randint"), index(n))
 
     def gaussian(self, source: str, mean: float = 0.0, sigma: float = 1.0) -> float:
         """Normally distributed."""
@@ -154,18 +155,18 @@ class Replay:
         self._path = path
         self._counts: dict[str, int] = {} if counts is None else counts
 
-    def at(self, name: str, index: int = 0) -> Replay:
-        return Replay(self._choices, f"{self._path}{name}/{index}/", self._counts)
+    def at(self, name: str, place: int = 0) -> Replay:
+        return Replay(self._choices, f"{self._path}{name}/{place}/", self._counts)
 
     def _take(self, source: str, *parameters: Any) -> Any:
         name = self._path + source
-        index = self._counts.get(name, 0)
-        self._counts[name] = index + 1
-        if (name, index) not in self._choices:
+        call = self._counts.get(name, 0)
+        self._counts[name] = call + 1
+        if (name, call) not in self._choices:
             raise ModelError(
-                f"the model asks for ({name!r}, {index}), which is not among the choices: another "
+                f"the model asks for ({name!r}, {call}), which is not among the choices: another "
                 "model, or a world in which it goes another way"
             )
-        return self._choices[name, index]
+        return self._choices[name, call]
 
     flip = randint = gaussian = uniform = categorical = exponential = lognormal = _take
