@@ -1,4 +1,4 @@
-"""Commands of the robots: run a monitored mission."""
+"""Commands of the robots: run a monitored mission, serve a simulated NAO."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command, folder, natural, progress
+from anytime.command_line import Answer, add_command, folder, natural, positive, progress
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -32,6 +32,19 @@ def declare(commands: Any) -> None:
         default=Path("anytime-run"),
         metavar="DIR",
         help="for the log and the page (default anytime-run)",
+    )
+
+    parser = add_command(commands, "nao-sim", nao_sim, "serve a simulated NAO over NAOqi")
+    parser.add_argument(
+        "--scene", default="sitting", metavar="FILE|NAME", help="a shipped one (default sitting)"
+    )
+    parser.add_argument("--port", type=natural, default=0, help="on 127.0.0.1 (default: any)")
+    pace = parser.add_mutually_exclusive_group()
+    pace.add_argument("--rate", type=positive, default=1.0, metavar="X", help="times real time")
+    pace.add_argument("--lockstep", action="store_true", help="time stands until it is told")
+    parser.add_argument("--seed", type=natural, metavar="N", help="instead of the scene's")
+    parser.add_argument(
+        "--fault", action="append", default=[], metavar="KIND[:FROM[:TO]]", help="what goes wrong"
     )
 
 
@@ -75,6 +88,37 @@ def run(options: argparse.Namespace) -> Answer:
         },
         0 if report else 1,
     )
+
+
+def nao_sim(options: argparse.Namespace) -> Answer:
+    """Serve a simulated NAO until stdin closes or ctrl-c; the line with READY tells its url."""
+    from importlib.resources import files
+
+    from anytime.command_line import as_json
+    from monitor.robots.nao_faults import read_fault
+    from monitor.robots.nao_scenes import read_scene
+    from monitor.robots.naoqi_server import serve, until_stdin_closes
+
+    if options.port > 65535:
+        raise AnytimeError(f"port is {options.port}; it must be 0 (any) to 65535")
+    file = Path(options.scene)
+    if not file.suffix:
+        file = Path(str(files("experiments") / "data" / "scenes")) / f"{options.scene}.toml"
+        if not file.exists():
+            known = ", ".join(sorted(each.stem for each in file.parent.glob("*.toml")))
+            raise AnytimeError(f"no scene {options.scene!r}; there are {known}, or give a file")
+    scene = read_scene(file, seed=options.seed)
+    faults = [read_fault(text) for text in options.fault]
+    told: list[str] = []
+
+    def ready(url: str) -> None:
+        told.append(url)
+        print(as_json({"ready": url}) if options.json else f"READY {url}", flush=True)
+
+    rate = None if options.lockstep else options.rate
+    done = until_stdin_closes()
+    serve(scene, port=options.port, rate=rate, faults=faults, ready=ready, done=done)
+    return Answer(f"served {scene.name} at {told[0]}", {"scene": scene.name, "url": told[0]})
 
 
 def _wide(grid: GridMission) -> str:

@@ -1,0 +1,314 @@
+"""A simulated NAO served as NAOqi services over libqi, on 127.0.0.1 alone.
+
+What there is, is listed in docs/nao.md; calling what there is not, fails at the caller.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Any
+
+from anytime.clocks import Clock
+from monitor.robots.nao_body import Action, NaoBody, Outcome, Reading
+from monitor.robots.nao_clocks import PacedClock, ToldClock
+from monitor.robots.nao_faults import Fault, Faulty
+from monitor.robots.nao_scenes import Scene
+from monitor.robots.naoqi_link import libqi
+from monitor.robots.simulated_nao import SimulatedNao
+from planners.nao import POSTURES
+
+NO_ECHO = 5.0
+"""Metres that a sonar tells when it hears nothing, in NAOqi."""
+
+FALLEN = "robotHasFallen"
+POSTURE = "PostureChanged"
+FAILED = "ALMotion/MoveFailed"
+SONARS = tuple(f"Device/SubDeviceList/US/{side}/Sensor/Value" for side in ("Left", "Right"))
+_SILENT = 0.2  # seconds that lock-step waits for a command that it was told of
+
+
+class Stage:
+    """The robot behind the services: one lock, one body, the calls that wait for it."""
+
+    def __init__(self, scene: Scene, faults: Iterable[Fault] = (), rate: float | None = 1.0):
+        self.rate = rate  # None is lock-step
+        self.commands = 0  # how many moveTo and goToPosture there were
+        self.begun = False
+        self.listened = False  # whether somebody subscribed to the sonars
+        self.awake = True
+        self.lock = threading.Condition()
+        self.memory: dict[str, Any] = {FALLEN: 0.0, POSTURE: scene.posture, FAILED: []}
+        self.subscribers: dict[str, Any] = {}
+        self.qi = libqi()
+        self._scene, self._faults = scene, tuple(faults)
+        self._waiting: list[tuple[int, str, Action, Any]] = []
+        self.begin(0.0)
+
+    def begin(self, start: float, seed: int | None = None) -> None:
+        """Let the scene start anew at a time, of another seed if one is given."""
+        with self.lock:
+            self.close()
+            scene = self._scene if seed is None else replace(self._scene, seed=seed)
+            self.clock: Clock = ToldClock(start) if self.rate is None else PacedClock(self.rate)
+            self.simulated = SimulatedNao(scene, self.clock)
+            self.body: NaoBody = Faulty(self.simulated, self._faults)
+            self.awake, self.commands = True, 0
+            self.live()
+
+    def command(self, kind: str, begin: Callable[[NaoBody], Action]) -> Any:
+        """Tell the body something; the future of whether it was done."""
+        with self.lock:
+            self.live()
+            self.commands += 1
+            promise = self.qi.Promise()
+            if self.awake:
+                self._waiting.append((self.commands, kind, begin(self.body), promise))
+                self.live()
+            else:  # without stiffness nothing moves, and only a posture notices
+                promise.setValue(kind == "walk")
+            self.lock.notify_all()
+            return promise.future()
+
+    def halt(self, kind: str) -> None:
+        """Break off what is in execution, if it is of that kind."""
+        with self.lock:
+            self.live()
+            if any(waiting == kind for _, waiting, _, _ in self._waiting):
+                self.body.stop()
+                self.live()
+
+    def live(self) -> Reading:
+        """Live up to now: raise what there is to raise, answer the calls that came to their end."""
+        with self.lock:
+            reading = self.body.read()
+            if reading.fallen and not self.memory[FALLEN]:
+                self.awake = False
+            self.remember(FALLEN, float(reading.fallen))
+            self.remember(POSTURE, reading.posture)
+            for waiting in tuple(self._waiting):
+                _, kind, action, promise = waiting
+                if promise.isCancelRequested() and action.poll() is None:
+                    action.cancel()
+                if (outcome := action.poll()) is not None:
+                    self._waiting.remove(waiting)
+                    if (kind, outcome) == ("walk", Outcome.FAILED):
+                        self.remember(FAILED, ["ALMotion", "obstacle", list(reading.pose_in_world)])
+                    promise.setValue(outcome is Outcome.DONE)
+            return reading
+
+    def running(self) -> int:
+        """The number of the command in execution, 0 if there is none."""
+        return max((number for number, _, _, _ in self._waiting), default=0)
+
+    def settle(self, now: float, commands: int) -> tuple[float, int]:
+        """In lock-step: live up to `now`, after so many commands; the robot's time, and `running`.
+
+        Calls of different services may overtake each other, hence the count.
+        """
+        with self.lock:
+            self.lock.wait_for(lambda: self.commands >= commands, _SILENT)
+            if isinstance(self.clock, ToldClock):
+                self.clock.tell(now)
+            return self.live().time, self.running()
+
+    def remember(self, key: str, value: Any) -> None:
+        """Keep a value in the memory, and raise its event if it is another than before."""
+        if self.memory.get(key) != value:
+            self.memory[key] = value
+            if key in self.subscribers:
+                self.subscribers[key].signal(value)
+
+    def close(self) -> None:
+        """Answer all calls that still wait: a promise that is dropped is an error at its caller."""
+        with self.lock:
+            for _, _, _, promise in self._waiting:
+                promise.setValue(False)
+            self._waiting.clear()
+
+
+class Motion:
+    """ALMotion: walking. Metres, radians, in the robot's frame."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def moveTo(self, x: float, y: float, theta: float) -> Any:  # noqa: N802
+        return self._stage.command("walk", lambda body: body.walk(x, y, theta))
+
+    def stopMove(self) -> None:  # noqa: N802
+        self._stage.halt("walk")
+
+    def moveIsActive(self) -> bool:  # noqa: N802
+        return self._stage.live().moving
+
+    def getRobotPosition(self, use_sensors: bool) -> list[float]:  # noqa: N802
+        return list(self._stage.live().pose_in_world)
+
+    def wakeUp(self) -> None:  # noqa: N802
+        self._stage.live()
+        self._stage.awake = True
+
+    def rest(self) -> Any:
+        resting = self._stage.command("posture", lambda body: body.posture("Crouch"))
+        self._stage.awake = False
+        return resting
+
+    def robotIsWakeUp(self) -> bool:  # noqa: N802
+        self._stage.live()
+        return self._stage.awake
+
+
+class Postures:
+    """ALRobotPosture: the six postures, at full speed whatever is asked."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def goToPosture(self, name: str, speed: float) -> Any:  # noqa: N802
+        return self._stage.command("posture", lambda body: body.posture(name))
+
+    def stopMove(self) -> None:  # noqa: N802
+        self._stage.halt("posture")
+
+    def getPosture(self) -> str:  # noqa: N802
+        return self._stage.live().posture
+
+    def getPostureList(self) -> list[str]:  # noqa: N802
+        return list(POSTURES)
+
+
+class Subscriber:
+    """What `ALMemory.subscriber(key)` returns: connect to its signal."""
+
+    def __init__(self, qi: Any) -> None:
+        self.signal = qi.Signal("(m)")
+
+
+class Memory:
+    """ALMemory: the sonars and the events, read or subscribed to."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def getData(self, key: str) -> Any:  # noqa: N802
+        (value,) = self.getListData([key])
+        if value is None:
+            raise RuntimeError(f"ALMemory::getData: no data for the key {key}")
+        return value
+
+    def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
+        told = self._stage.live().sonars if self._stage.listened else (0.0, 0.0)
+        heard = [NO_ECHO if each == float("inf") else each for each in told]
+        now = self._stage.memory | dict(zip(SONARS, heard, strict=True))
+        return [now.get(key) for key in keys]
+
+    def getDataListName(self) -> list[str]:  # noqa: N802
+        return sorted([*self._stage.memory, *SONARS])
+
+    def subscriber(self, key: str) -> Subscriber:
+        with self._stage.lock:
+            return self._stage.subscribers.setdefault(key, Subscriber(self._stage.qi))
+
+
+class Listening:
+    """ALSonar: until somebody subscribes, the sonars' keys tell nothing."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._names: set[str] = set()
+
+    def subscribe(self, name: str) -> None:
+        self._names.add(name)
+        self._stage.listened = True
+
+    def unsubscribe(self, name: str) -> None:
+        self._names.discard(name)
+        self._stage.listened = bool(self._names)
+
+
+class SimClock:
+    """The service that no robot has: the simulation's time, and the truth."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def rate(self) -> float:
+        """How fast time runs; 0 is lock-step."""
+        return self._stage.rate or 0.0
+
+    def now(self) -> float:
+        return self._stage.clock.now()
+
+    def begun(self) -> bool:
+        """Whether `begin` was called."""
+        return self._stage.begun
+
+    def begin(self, start: float, seed: int | None) -> None:
+        """Lock-step: let the scene start anew at a time, of that seed if it is one."""
+        if self._stage.rate is not None:
+            raise RuntimeError("SimClock.begin: only a server with --lockstep can begin anew")
+        self._stage.begin(start, seed)
+        self._stage.begun = True
+
+    def commands(self) -> int:
+        """How many moveTo and goToPosture there were."""
+        return self._stage.commands
+
+    def settle(self, now: float, commands: int) -> list[float]:
+        """Lock-step: live up to a time, after so many commands; time and number of what runs."""
+        if self._stage.rate is not None:
+            raise RuntimeError("SimClock.settle: only a server with --lockstep is told the time")
+        return list(self._stage.settle(now, commands))
+
+    def truth(self) -> list[float]:
+        """Where the robot really is: x, y, heading; falls and contacts so far."""
+        with self._stage.lock:
+            robot = self._stage.simulated
+            return [*robot.true_pose_in_world, float(robot.falls), float(robot.world.contacts)]
+
+
+def serve(
+    scene: Scene,
+    *,
+    port: int = 0,
+    rate: float | None = 1.0,
+    faults: Iterable[Fault] = (),
+    ready: Callable[[str], None],
+    done: threading.Event,
+) -> None:
+    """Serve a scene until `done` is set; `ready` is called with the url.
+
+    rate: how fast time runs; None is lock-step: it stands until `SimClock.settle` tells it.
+    """
+    qi = libqi()
+    stage = Stage(scene, faults, rate)
+    session = qi.Session()
+    session.listenStandalone(f"tcp://127.0.0.1:{port}")
+    kinds = {"ALMotion": Motion, "ALRobotPosture": Postures, "ALMemory": Memory}
+    for name, kind in (kinds | {"ALSonar": Listening, "SimClock": SimClock}).items():
+        session.registerService(name, kind(stage))
+    try:
+        ready(session.endpoints()[0])
+        period = None if rate is None else max(0.001, 0.02 / rate)
+        while not done.wait(period):
+            stage.live()
+    finally:
+        stage.close()
+        session.close()
+
+
+def until_stdin_closes() -> threading.Event:
+    """An event that is set when whoever started this process is gone."""
+    done = threading.Event()
+
+    def watch() -> None:
+        # os.read and not sys.stdin: a thread that waits in that would hold its lock at exit
+        while os.read(0, 4096):
+            pass
+        done.set()
+
+    threading.Thread(target=watch, daemon=True).start()
+    return done
