@@ -13,7 +13,7 @@ from anytime.errors import AnytimeError
 if TYPE_CHECKING:
     from experiments.benchmarks.figures import Benchmark
 
-BENCHMARKS = ("planner", "compiler", "mission")
+BENCHMARKS = ("planner", "compiler", "mission", "query")
 
 
 def declare(commands: Any) -> None:

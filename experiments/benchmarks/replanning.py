@@ -35,9 +35,9 @@ def body() -> Body:
     return Body(speed=0.1, step_phase=0.0, posture_seconds=seconds, fall_seconds=20.0)
 
 
-def sitting(goal: Point = GOAL, *, blocked: bool = True, **more: Any) -> dict[str, Any]:
+def sitting(disc: Disc | None = OBSTACLE) -> dict[str, Any]:
     """[PRP16] Figure 1: the robot sits, the goal is one metre ahead, an obstacle between."""
-    return plan_world(goal, obstacles=[OBSTACLE] if blocked else [], body=body(), **more)
+    return plan_world(GOAL, obstacles=[disc] if disc else [], body=body())
 
 
 def detour(start: Point, goal: Point, disc: Disc | None) -> float:
@@ -92,7 +92,11 @@ class Timed:
     """A query whose own CPU time is counted."""
 
     def __init__(
-        self, world: Mapping[str, Any], seed: int, operators: Operators | None, population: int
+        self,
+        world: Mapping[str, Any],
+        seed: int,
+        operators: Operators | None = None,
+        population: int = 60,
     ) -> None:
         self.query = Query(plan, world, seed=seed, operators=operators, population=population)
         self.seconds = 0.0
@@ -118,24 +122,23 @@ class Timed:
         return Recovery(math.inf, math.inf)
 
     def walked(self) -> tuple[float, float]:
-        """Metres that the best plan walks, and its mean distance from the straight line."""
+        """Metres that the best plan walks, and how far it leads aside of the straight line."""
         world = dict(self.query.world)
         poses = trajectory(actions_of(self.query.best.choices), world)
         length = sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(poses))
-        aside = np.mean([abs(pose.y) for pose in poses[1:-1]]) if len(poses) > 2 else 0.0
-        return length, float(aside)
+        return length, max(abs(pose.y) for pose in poses)
 
 
-def first_plan(seed: int, operators: Operators | None, population: int) -> Recovery:
+def first_plan(seed: int, operators: Operators | None = None) -> Recovery:
     """From nothing to a good plan. The paper: 0.5 s."""
-    timed = Timed(sitting(), seed, operators, population)
+    timed = Timed(sitting(), seed, operators)
     good = least((0.0, 0.0), GOAL, OBSTACLE, 3.0) + CLOSE
-    return timed.until(lambda: timed.query.best.value <= good, 1.0)
+    return timed.until(lambda: timed.query.value <= good, 1.0)
 
 
-def removed(seed: int, operators: Operators | None, population: int, after: float) -> Recovery:
+def removed(seed: int, after: float, operators: Operators | None = None) -> Recovery:
     """The obstacle is removed, which changes the value of no good plan: when is it straight?"""
-    timed = Timed(sitting(), seed, operators, population)
+    timed = Timed(sitting(), seed, operators)
     timed.converge(after)
     timed.query.world["obstacle_count"] = 0
     return timed.until(lambda: _straight(timed), 1.0)
@@ -143,40 +146,40 @@ def removed(seed: int, operators: Operators | None, population: int, after: floa
 
 def _straight(timed: Timed) -> bool:
     straight = least((0.0, 0.0), GOAL, None, 3.0)
-    return timed.query.best.value <= straight + 0.02 and timed.walked()[0] <= 1.02
+    return timed.query.value <= straight + 0.02 and timed.walked()[0] <= 1.02
 
 
-def appeared(seed: int, operators: Operators | None, population: int) -> Recovery:
+def appeared(seed: int, operators: Operators | None = None) -> Recovery:
     """An obstacle appears when the robot has walked 0.2 m of its straight plan."""
-    timed = Timed(sitting(blocked=False), seed, operators, population)
+    timed = Timed(sitting(None), seed, operators)
     timed.converge(0.5)
     timed.query.world.update(
         x=0.2, posture=4, elapsed=5.0, obstacle_count=1, obstacles=_discs((0.6, 0.0, 0.2))
     )
     good = least((0.2, 0.0), GOAL, (0.6, 0.0, 0.2), 0.0) + CLOSE
-    return timed.until(lambda: timed.query.best.value <= good, 1.0)
+    return timed.until(lambda: timed.query.value <= good, 1.0)
 
 
-def fallen(seed: int, operators: Operators | None, population: int) -> Recovery:
+def fallen(seed: int, operators: Operators | None = None) -> Recovery:
     """The robot falls on its way and crouches where no plan expected it."""
-    timed = Timed(sitting(), seed, operators, population)
+    timed = Timed(sitting(), seed, operators)
     timed.converge(0.5)
     start = (0.3, 0.15)
     timed.query.world.update(x=start[0], y=start[1], heading=0.7, posture=1, elapsed=0.0)
     good = least(start, GOAL, OBSTACLE, 3.0) + CLOSE
-    return timed.until(lambda: timed.query.best.value <= good, 1.0)
+    return timed.until(lambda: timed.query.value <= good, 1.0)
 
 
-def moving(seed: int, operators: Operators | None, population: int) -> float:
+def moving(seed: int, operators: Operators | None = None) -> float:
     """The target moves at 10 cm/s for 6 s: the mean excess of the best plan after 0.5 s."""
-    timed = Timed(sitting(), seed, operators, population)
+    timed = Timed(sitting(), seed, operators)
     excess: list[float] = []
     while timed.seconds < 6.0:
         goal = (1.0 + 0.1 * timed.seconds, 0.0)
         timed.query.world["goal_x"] = goal[0]
         timed.step()
         if timed.seconds > 0.5:
-            excess.append(timed.query.best.value - least((0.0, 0.0), goal, OBSTACLE, 3.0))
+            excess.append(timed.query.value - least((0.0, 0.0), goal, OBSTACLE, 3.0))
     return float(np.mean(excess))
 
 

@@ -823,6 +823,30 @@ def _copy(h: Any, source: int, target: int) -> None:
     values[h.side, target] = values[h.side, source]
 
 
+@njit(cache=True)
+def adopt(header: int, value: float) -> None:
+    """Put what was run on the spare row of the children into the place of the worst parent."""
+    h = header_at(header)
+    rows = h.size + 1
+    genomes = carray(pointer(h.genomes), (2, rows, h.most_cells), np.float64)
+    logs = carray(pointer(h.logs), (2, rows, h.longest), np.int32)
+    lengths = carray(pointer(h.lengths), (2, rows), np.int32)
+    now = carray(pointer(h.values), (2, rows), np.float64)[h.side]
+    worst = np.int64(0)
+    for row in range(h.main):
+        worst = row if now[row] > now[worst] else worst
+    if h.overflow or not value < now[worst]:
+        return
+    genomes[h.side, worst] = genomes[1 - h.side, h.size]
+    logs[h.side, worst] = logs[1 - h.side, h.size]
+    lengths[h.side, worst] = h.length
+    now[worst] = value
+    first, size, kept = _extent(h, _island(h, worst))
+    _choose_elites(h, now, first, size, kept)
+    if value < now[h.best]:
+        h.best, h.best_island = worst, _island(h, worst)
+
+
 # --- The loop.
 
 

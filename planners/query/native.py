@@ -259,9 +259,15 @@ def _mark(text: Text) -> str:
             repr((function.original.__defaults__, function.original.__kwdefaults__)).encode()
         )
         for name, value in sorted(function.constants.items()):
-            array = isinstance(value, np.ndarray)
-            digest.update(name.encode() + (value.tobytes() if array else repr(value).encode()))
+            digest.update(name.encode() + _bytes(value))
     return digest.hexdigest()
+
+
+def _bytes(constant: Any) -> bytes:
+    if isinstance(constant, np.ndarray):
+        return constant.tobytes()
+    # of a function the name: its text is the engine's, which is in the digest
+    return str(getattr(constant, "__name__", None) or repr(constant)).encode()
 
 
 def _engine() -> str:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anytime.clocks import Clock, Deadline, WorkClock
 from anytime.errors import AnytimeError
@@ -93,6 +94,13 @@ class Query:
             return self._best
 
     @property
+    def values(self) -> NDArray[np.float64]:
+        """What each individual of the last generation was worth, float64 [size], scouts last."""
+        with self._turns.take():
+            begin = self._memory["side"] * (self.size + 1)
+            return self._memory.blocks["values"][begin : begin + self.size].copy()
+
+    @property
     def value(self) -> float:
         """The value of the best; inf before the first generation."""
         return self._value(self._memory["best"])
@@ -150,8 +158,8 @@ class Query:
             )
         deadline = Deadline.after(seconds)
         last = self.evaluations + evaluations
-        while not deadline.expired() and self.evaluations + self.size <= last:
-            self.step(1, until)
+        while not deadline.expired() and (left := last - self.evaluations) >= self.size:
+            self.step(int(min(CHUNK, left // self.size)), until)
             if self.value <= until:
                 break
         return self.best
@@ -169,6 +177,19 @@ class Query:
             for cell, value in fixed:
                 self._memory.blocks["fixed"][cell] = float(value)
             self._memory["constrained"] = int(bool(fixed))
+
+    def suggest(self, choices: Mapping[Address, Any]) -> None:
+        """Put known choices into the population, in the place of its worst: yesterday's plan, or
+        what an expert would do. Choices that the model asks for beyond them are drawn.
+
+        Raises AnytimeError for an address that the model never asked for.
+        """
+        if self.generations == 0:
+            self.step()
+        with self._turns.take():
+            self.world.take_over()
+            genetics.adopt(self._memory.address, self._valued(choices))
+            self._best = None
 
     def value_of(self, choices: Mapping[Address, Any]) -> float:
         """What the model returns for these choices in the newest world; others are drawn."""
@@ -263,7 +284,6 @@ class Query:
             value = genetics.call(memory.address, self._native.address, self.world.address)
         for name, before in kept.items():
             memory[name] = before
-        self._grow()
         return math.inf if math.isnan(value) else value
 
 

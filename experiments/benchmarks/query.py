@@ -1,0 +1,352 @@
+"""The optimisation query's figures: its speed, its rivals, and a world that changes.
+
+Seconds are CPU-seconds of the searching thread, native code warm. What is compared is measured in
+turns, in this very run; a ratio is the median over the turns.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.benchmarks import replanning
+from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.replanning import Summary, Timed, sitting
+from experiments.benchmarks.rivals import (
+    RIVALS,
+    Problem,
+    Stop,
+    cpp_program,
+    installed,
+    measured_layout,
+    missing,
+    plain_world,
+)
+from experiments.benchmarks.rivals.moving_peaks import PERIOD, Course, Landscape, offline_error
+from experiments.benchmarks.rivals.moving_peaks import peaks as peaks_function
+from experiments.benchmarks.rivals.swarms import PEERS
+from planners import query
+from planners.nao_plan import plan
+from planners.query import SWITCHES, Operators, Query
+
+PEAKS = Operators(
+    crossover=0.0,
+    line=0.0,
+    difference=0.0,
+    cloud=1.0,
+    pair=0.0,
+    structure=0.0,
+    immigrants=0.0,
+    scouts=0.0,
+    islands=10,
+)
+"""For a landscape of ten peaks that take turns: ten islands of clouds, one for each."""
+
+peaks = query.model(peaks_function)
+_GENERATIONS = 400  # of a timed turn: 36,000 evaluations
+_PRINTED = ((0.036, -0.352), (0.964, 0.352))
+"""The walks of the plan that [PRP16] §4 prints as nearly optimal."""
+
+
+def measure(
+    *,
+    quick: bool = False,
+    full: bool = False,
+    seed: int = 0,
+    maps: Path | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Benchmark:
+    """Measure the query on the NAO's plans, the toy of [PRP16] §2 and the moving peaks.
+
+    The quick form takes fewer seeds; the full one prints the ablation of the operators as well.
+    `maps` is not used.
+    """
+    seeds = range(seed, seed + (8 if quick else 30))
+    few = range(seed, seed + (3 if quick else 10))
+    figures: dict[str, float | int | None] = {}
+    reasons: dict[str, str] = {}
+    settings: dict[str, object] = {"seeds": len(seeds), "not_measured": reasons}
+
+    progress("evaluations a second: native, plain, C++, Optuna")
+    _speeds(figures, reasons, settings, pairs=5 if quick else 9)
+    progress(f"{len(seeds)} seeds of each scenario of [PRP16] §4")
+    _scenarios(figures, seeds, few)
+    progress("rivals on the NAO's plan")
+    _rivals(figures, reasons, settings, few)
+    progress("moving peaks")
+    _peaks(figures, settings, few, periods=30 if quick else 100)
+    progress("a control loop beside the query")
+    figures["control_loop.p95_ratio"] = _control_loop(3 if quick else 7, 2.0)
+    progress("the start of a process; plain against native")
+    figures["start.cold_over_cached"] = _start(settings)
+    figures["parity.mismatches"] = _parity(range(seed, seed + (200 if quick else 1000)))
+    if full:
+        progress("ablation")
+        settings["ablation"] = _ablation(seeds)
+    return Benchmark("query", figures, settings, seed)
+
+
+# --- Speed.
+
+
+def _rate(searched: Query, generations: int) -> float:
+    """Evaluations a CPU-second over some generations."""
+    before = searched.evaluations
+    begun = time.thread_time()
+    searched.step(generations)
+    return (searched.evaluations - before) / (time.thread_time() - begun)
+
+
+def _speeds(figures: dict, reasons: dict, settings: dict, pairs: int) -> None:
+    ratios: list[float] = []
+    for turn in range(pairs):
+        native, plain = (Query(plan, sitting(), seed=turn, native=form) for form in (True, False))
+        native.step(5)
+        plain.step(5)
+        ratios.append(_rate(native, _GENERATIONS) / _rate(plain, 20))
+    figures["vs_plain.nao"] = float(np.median(ratios))
+    figures["vs_plain.nao_low"], figures["vs_plain.nao_high"] = min(ratios), max(ratios)
+    if cpp_program.compiler() is None:
+        for key in ("vs_cpp.nao", "vs_cpp_tags.nao"):
+            figures[key], reasons[key] = None, "no g++ on this machine"
+    else:
+        for key, variant in (("vs_cpp.nao", "slots"), ("vs_cpp_tags.nao", "tags")):
+            found = cpp_program.compare(sitting(), variant, pairs=pairs)
+            figures[key] = found.ratio if found.same == 1.0 else None
+            if found.same < 1.0:
+                reasons[key] = "the C++ program made other choices"
+    if "optuna.random" not in installed():
+        figures["vs_optuna.nao"], reasons["vs_optuna.nao"] = None, "Optuna is not installed"
+        return
+    problem = _problem()
+    ratios = []
+    for turn in range(pairs):
+        ours = Query(plan, sitting(), seed=turn)
+        ours.step(5)
+        trail = RIVALS["optuna.random"].search(problem, 0.5, -math.inf, turn)
+        ratios.append(_rate(ours, _GENERATIONS) / trail.rate)
+    figures["vs_optuna.nao"] = float(np.median(ratios))
+    settings["evaluations_a_second"] = round(_rate(Query(plan, sitting()), _GENERATIONS))
+
+
+def _problem() -> Problem:
+    world = plain_world(sitting())
+    return Problem(plan, world, measured_layout(plan, world, np.random.default_rng(0)))
+
+
+# --- The scenarios.
+
+
+def _scenarios(figures: dict, seeds: Iterable[int], few: Iterable[int]) -> None:
+    first = Summary.of([replanning.first_plan(seed) for seed in seeds])
+    figures["first_plan.found"] = first.found
+    figures["first_plan.p90_ms"] = first.p90_ms
+    figures["first_plan.p90_evaluations"] = first.p90_evaluations
+    early, late = (
+        Summary.of([replanning.removed(seed, after) for seed in seeds]) for after in (0.5, 3.0)
+    )
+    figures["removed.recovered"] = min(early.found, late.found)
+    figures["removed.p90_ms"] = max(early.p90_ms, late.p90_ms)
+    bent = [_papers_plan_after_the_removal(seed) for seed in few]
+    figures["removed_baseline.mean_abs_y"] = float(np.mean(bent))
+    for name, scenario in (("appeared", replanning.appeared), ("fall", replanning.fallen)):
+        found = Summary.of([scenario(seed) for seed in seeds])
+        figures[f"{name}.recovered"] = found.found
+        figures[f"{name}.p90_ms"] = found.p90_ms
+    errors = [replanning.moving(seed) for seed in few]
+    figures["moving.offline_error"] = float(np.mean(errors))
+
+
+def _papers_plan_after_the_removal(seed: int) -> float:
+    """How far aside the paper's operators still walk, 3 s after the obstacle went: their whole
+    population is the plan that the paper prints, up to a millimetre."""
+    world = sitting(disc=(0.5, 0.0, 0.17))  # the printed plan passes it
+    timed = Timed(world, seed, Operators.paper(), 1000)
+    rng = np.random.default_rng(seed)
+    walks = np.array(_PRINTED)
+    timed.step()
+    while np.ptp(timed.query.values) > 0.01:
+        timed.query.suggest(_printed_plan(walks + rng.normal(0.0, 1e-3, walks.shape)))
+    timed.query.world["obstacle_count"] = 0
+    timed.converge(3.0)
+    return timed.walked()[1]
+
+
+def _printed_plan(walks: np.ndarray) -> dict[tuple[str, int], Any]:
+    """Stand up, then two walks."""
+    return {
+        **{("more", i): i < 3 for i in range(4)},
+        **dict(zip([("action", i) for i in range(3)], (3, 1, 1), strict=True)),
+        ("posture", 0): 4,
+        **{("walk", i): float(value) for i, value in enumerate(walks.ravel())},
+    }
+
+
+# --- Rivals.
+
+
+def _rivals(figures: dict, reasons: dict, settings: dict, seeds: Iterable[int]) -> None:
+    target = replanning.least((0.0, 0.0), replanning.GOAL, replanning.OBSTACLE, 3.0)
+    target += replanning.CLOSE
+    problem = _problem()
+    ours: list[float] = []
+    theirs: dict[str, list[float]] = {name: [] for name in installed()}
+    budget, late = 4.0, set[str]()
+    for seed in seeds:
+        ours.append(_time_to(target, seed))
+        for name, rival in installed().items():
+            trail = rival.search(problem, budget, target, seed)
+            theirs[name].append(trail.reached_seconds or budget)
+            if trail.reached_seconds is None:
+                late.add(name)
+    medians = {name: float(np.median(times)) for name, times in theirs.items()}
+    best = min(medians, key=lambda name: medians[name])
+    figures["vs_best_peer.nao"] = medians[best] / float(np.median(ours))
+    settings["best_peer"] = best
+    settings["seconds_to_first_plan"] = {"ours": float(np.median(ours)), **medians}
+    settings["reached_not_always"] = sorted(late)
+    settings["rivals_not_installed"] = missing()
+
+
+def _time_to(target: float, seed: int) -> float:
+    searched = Query(plan, sitting(), seed=seed)
+    begun = time.thread_time()
+    searched.run(until=target)
+    return time.thread_time() - begun
+
+
+def _peaks(figures: dict, settings: dict, seeds: Iterable[int], periods: int) -> None:
+    errors = {
+        name: [offline_error(peer, seed, periods) for seed in seeds] for name, peer in PEERS.items()
+    }
+    means = {name: float(np.mean(found)) for name, found in errors.items()}
+    figures["moving_peaks.offline_error"] = float(np.mean([_ours(seed, periods) for seed in seeds]))
+    figures["moving_peaks.best_peer"] = min(means.values())
+    settings["moving_peaks"] = means
+
+
+def _ours(seed: int, periods: int) -> float:
+    """Our offline error; the landscape's draws are those of the peers."""
+    course = Course(Landscape(np.random.default_rng((seed, 0))), periods)
+    searched = Query(peaks, course.landscape.world(), population=50, seed=seed, operators=PEAKS)
+    assert PERIOD % searched.size == 0
+    with suppress(Stop):
+        while True:
+            changes = course.changes
+            searched.step()
+            course.charge(searched.values)
+            if course.changes != changes:
+                searched.world.update(course.landscape.world())
+    return course.offline_error
+
+
+# --- Beside a control loop, at the start, and plain against native.
+
+
+def _control_loop(turns: int, seconds: float) -> float:
+    """p95 of the lateness of a 100 Hz loop, beside the query over alone."""
+    searched = Query(plan, sitting(), seed=1)
+    searched.step()
+    ratios: list[float] = []
+    for _ in range(turns):
+        alone = _lateness(seconds)
+        with searched.background():
+            beside = _lateness(seconds)
+        ratios.append(beside / alone)
+    return float(np.median(ratios))
+
+
+def _lateness(seconds: float) -> float:
+    late: list[float] = []
+    due = time.perf_counter()
+    for _ in range(int(seconds * 100)):
+        due += 0.01
+        time.sleep(max(0.0, due - time.perf_counter()))
+        late.append(time.perf_counter() - due)
+    return float(np.quantile(late, 0.95))
+
+
+_STARTING = """
+import time
+from planners import query
+from planners.query import genetics
+from model import plan
+from experiments.benchmarks.replanning import sitting
+begun = time.process_time()
+searched = query.Query(plan, sitting())
+print(time.process_time() - begun)
+"""
+
+
+def _start(settings: dict) -> float:
+    """CPU-seconds of making the NAO's model native in a new process, over those of loading it."""
+    source = Path(sys.modules["planners.nao_plan"].__file__ or "").read_text()
+    cold: list[float] = []
+    cached: list[float] = []
+    for _ in range(3):
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "model.py").write_text(source)
+            for times in (cold, cached):
+                environment = {**os.environ, "PYTHONPATH": os.pathsep.join([folder, *sys.path])}
+                done = subprocess.run(
+                    [sys.executable, "-c", _STARTING],
+                    capture_output=True,
+                    text=True,
+                    check=True,
+                    env=environment,
+                )
+                times.append(float(done.stdout))
+    settings["start_seconds"] = {"cold": np.median(cold), "cached": np.median(cached)}
+    return float(np.median(np.array(cold) / np.array(cached)))
+
+
+def _parity(seeds: Iterable[int]) -> int:
+    """Seeds for which the plain form and the native form differ in any value of any individual."""
+    mismatches = 0
+    for seed in seeds:
+        native, plain = (Query(plan, sitting(), seed=seed, native=form) for form in (True, False))
+        native.step(2)
+        plain.step(2)
+        same = np.array_equal(native.values, plain.values)
+        mismatches += not (same and dict(native.best.choices) == dict(plain.best.choices))
+    return mismatches
+
+
+# --- What each operator is worth.
+
+
+def _ablation(seeds: Iterable[int]) -> dict[str, dict[str, object]]:
+    """The scenarios with each operator switched off: p90 in ms, inf where some never recover."""
+    cases = {"default": Operators(), "paper": Operators.paper()}
+    cases |= {f"without {name}": Operators().without(name) for name in SWITCHES}
+    table: dict[str, dict[str, object]] = {}
+    for name, operators in cases.items():
+        row: dict[str, object] = {}
+        for scenario, run in (
+            ("first_plan", lambda s, o: replanning.first_plan(s, o)),
+            ("removed", lambda s, o: replanning.removed(s, 0.5, o)),
+            ("appeared", lambda s, o: replanning.appeared(s, o)),
+            ("fall", lambda s, o: replanning.fallen(s, o)),
+        ):
+            row[scenario] = Summary.of([run(seed, operators) for seed in seeds]).p90_ms
+        gaps = [_gap(seed, operators) for seed in seeds]
+        row["gap_after_100k"] = float(np.median(gaps))
+        table[name] = row
+    return table
+
+
+def _gap(seed: int, operators: Operators) -> float:
+    """How far from the best plan 100,000 evaluations come."""
+    searched = Query(plan, sitting(), seed=seed, operators=operators)
+    searched.run(evaluations=100_000)
+    return searched.value - replanning.least((0.0, 0.0), replanning.GOAL, replanning.OBSTACLE, 3.0)
