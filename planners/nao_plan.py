@@ -16,10 +16,11 @@ import numpy as np
 from anytime.errors import AnytimeError
 from planners import query
 from planners.nao import CROUCH, POSTURES, STAND, STAND_INIT, STAND_ZERO, Body
-from planners.query import Address
+from planners.query import Address, Choices
 
 WAIT, WALK, TURN, POSTURE = range(4)
 """The actions: wait(ms), walk(x, y), turn(a), posture(name)."""
+ACTIONS = ("wait", "walk", "turn", "posture")
 
 MOST_OBSTACLES = 8
 STOPS, TELEPORTS = 0, 1
@@ -33,7 +34,10 @@ def plan_world(
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
     posture: str = "Sit",
     obstacles: Sequence[tuple[float, float, float]] = (),
+    done: int = 0,
+    current: str | None = None,
     elapsed: float = 0.0,
+    goal_velocity: tuple[float, float] = (0.0, 0.0),
     drift: float = 0.0,
     effort: float = 0.005,
     collision: str = "stops",
@@ -42,10 +46,12 @@ def plan_world(
     """What a plan is simulated in, for `Query(plan, …)`.
 
     goal: (x, y) in world, metres. pose: (x, y, heading) in world. obstacles: discs (x, y, radius)
-    in world, the robot's own radius included. elapsed: seconds of the plan that are executed
-    already, from whose end `pose` and `posture` are. drift: radians by which standing up turns the
-    robot. effort: of a second, in metres of distance. collision: "stops", or "paper" for the
-    paper's rule. Raises AnytimeError for an unknown posture or rule and for too many obstacles.
+    in world, the robot's own radius included. done: actions of the plan that are complete, which
+    `pose` and `posture` contain. current, elapsed: the name of the action that goes on, if any, and
+    the seconds since it began. goal_velocity: metres a second. drift: radians by which standing up
+    turns the robot. effort: of a second, in metres of distance. collision: "stops", or "paper"
+    for the paper's rule.
+    Raises AnytimeError for an unknown posture or rule and for too many obstacles.
     """
     if posture not in POSTURES:
         raise AnytimeError(f"posture {posture!r} is unknown; choose from {', '.join(POSTURES)}")
@@ -67,6 +73,10 @@ def plan_world(
         "posture": POSTURES.index(posture),
         "goal_x": goal[0],
         "goal_y": goal[1],
+        "goal_vx": goal_velocity[0],
+        "goal_vy": goal_velocity[1],
+        "done": done,
+        "current": -1 if current is None else ACTIONS.index(current),
         "elapsed": elapsed,
         "drift": drift,
         "effort": effort,
@@ -110,69 +120,89 @@ def first_contact(x: float, y: float, dx: float, dy: float, w: Any) -> tuple[flo
     return share, which
 
 
+def duration(posture: int, action: int, ahead: float, left: float, w: Any) -> float:
+    """Seconds that an action takes from a posture; 0 for one that is refused."""
+    if action == WAIT:
+        return ahead
+    if action == POSTURE:
+        return w.posture_seconds[posture, int(ahead)]
+    if not standing(posture):
+        return 0.0
+    if action == WALK:
+        return math.sqrt(ahead * ahead + left * left) / w.speed + w.step_phase
+    return abs(ahead) / w.turn_rate + w.step_phase
+
+
+def share_left(action: int, behind: float, takes: float, w: Any) -> float:
+    """What is left of an action after `behind` of its seconds. A walk moves but for half of its
+    step phase at the beginning and half of it at the end."""
+    if behind <= 0.0:
+        return 1.0
+    if behind >= takes:
+        return 0.0
+    if action in (WAIT, POSTURE):
+        return 1.0 - behind / takes
+    way = takes - w.step_phase
+    if way <= 0.0:
+        return 0.0
+    return 1.0 - min(1.0, max(0.0, (behind - 0.5 * w.step_phase) / way))
+
+
 def perform(
     x: float,
     y: float,
     heading: float,
     posture: int,
-    behind: float,
     seconds: float,
     action: int,
     ahead: float,
     left: float,
+    behind: float,
     w: Any,
-) -> tuple[float, float, float, int, float, float]:
+) -> tuple[float, float, float, int, float]:
     """One action: where it leads, and the seconds that it takes.
 
     ahead, left: what the action is told: wait (seconds, –), walk (x, y) in the robot's frame at its
-    start, turn (angle, –), posture (number, –). behind: seconds of the plan that are executed
-    already: an action that lies in them is skipped, one that reaches out of them in part, for the
-    world's pose and posture contain what was done ([PRP16] §4). A walk or a turn needs a standing
-    posture; otherwise nothing happens.
+    start, turn (angle, –), posture (number, –). behind: seconds since it began; what is executed of
+    it the world's pose and posture contain ([PRP16] §4). A walk or a turn needs a standing posture;
+    otherwise nothing happens.
     """
-    dx, dy, angle, target, takes = 0.0, 0.0, 0.0, posture, 0.0
+    takes = duration(posture, action, ahead, left, w)
+    share = share_left(action, behind, takes, w)
+    seconds += max(0.0, takes - behind)
     if action == WAIT:
-        takes = ahead
-    elif action == WALK:
-        if standing(posture):
-            c, s = math.cos(heading), math.sin(heading)
-            dx, dy = c * ahead - s * left, s * ahead + c * left
-            takes = math.sqrt(dx * dx + dy * dy) / w.speed + w.step_phase
-    elif action == TURN:
-        if standing(posture):
-            angle = ahead
-            takes = abs(angle) / w.turn_rate + w.step_phase
-    else:
+        return x, y, heading, posture, seconds
+    if action == POSTURE:
         target = int(ahead)
-        takes = w.posture_seconds[posture, target]
-    if behind >= takes:
-        return x, y, heading, posture, behind - takes, seconds
-    rest = 1.0 - behind / takes
-    dx, dy, angle = rest * dx, rest * dy, rest * angle
-    seconds += rest * takes
-    if not standing(posture) and standing(target):
-        heading += w.drift
-    heading += angle
-    share, hit = first_contact(x, y, dx, dy, w)
+        if not standing(posture) and standing(target):
+            heading += share * w.drift
+        return x, y, heading, target, seconds
+    if not standing(posture):
+        return x, y, heading, posture, seconds
+    if action == TURN:
+        return x, y, heading + share * ahead, posture, seconds
+    c, s = share * math.cos(heading), share * math.sin(heading)
+    dx, dy = c * ahead - s * left, s * ahead + c * left
+    touch, hit = first_contact(x, y, dx, dy, w)
     if hit < 0:
-        return x + dx, y + dy, heading, target, 0.0, seconds
+        return x + dx, y + dy, heading, posture, seconds
     if w.collision == TELEPORTS:
-        return w.obstacles[hit, 0], w.obstacles[hit, 1], heading, CROUCH, 0.0, seconds
-    seconds += w.fall_seconds
-    return x + share * dx, y + share * dy, heading, CROUCH, 0.0, seconds
+        return w.obstacles[hit, 0], w.obstacles[hit, 1], heading, CROUCH, seconds
+    return x + touch * dx, y + touch * dy, heading, CROUCH, seconds + w.fall_seconds
 
 
 def objective(x: float, y: float, seconds: float, w: Any) -> float:
-    """Metres from the goal, plus the effort of the seconds that it takes. [PRP16] §3."""
-    ex, ey = x - w.goal_x, y - w.goal_y
+    """Metres from where the goal will be then, plus the effort of the seconds. [PRP16] §3."""
+    ex = x - w.goal_x - w.goal_vx * seconds
+    ey = y - w.goal_y - w.goal_vy * seconds
     return math.sqrt(ex * ex + ey * ey) + w.effort * seconds
 
 
 @query.model
 def plan(rng: Any, w: Any) -> float:
     """A plan of any length, and what it costs. [PRP16] §3."""
-    x, y, heading, posture = w.x, w.y, w.heading, w.posture
-    behind, seconds = w.elapsed, 0.0
+    x, y, heading, posture, seconds = w.x, w.y, w.heading, w.posture, 0.0
+    made = 0
     while rng.flip("more", 0.7):
         action = rng.randint("action", 4)
         ahead, left = 0.0, 0.0
@@ -184,8 +214,12 @@ def plan(rng: Any, w: Any) -> float:
             ahead = rng.gaussian("turn", 0.0, 1.0)
         else:
             ahead = float(rng.randint("posture", 6))
-        x, y, heading, posture, behind, seconds = perform(
-            x, y, heading, posture, behind, seconds, action, ahead, left, w
+        made += 1
+        if made <= w.done:
+            continue
+        behind = w.elapsed if made == w.done + 1 and action == w.current else 0.0
+        x, y, heading, posture, seconds = perform(
+            x, y, heading, posture, seconds, action, ahead, left, behind, w
         )
     return objective(x, y, seconds, w)
 
@@ -235,17 +269,35 @@ def actions_of(choices: Mapping[Address, Any]) -> tuple[Action, ...]:
     return tuple(actions)
 
 
+def made_before(choices: Choices, done: int) -> Choices:
+    """The choices that the first `done` actions of a plan are made of."""
+    turns = [place for place, (source, _) in enumerate(choices) if source == "more"]
+    return choices.first(turns[done] if done < len(turns) else len(choices))
+
+
+def remaining(action: Action, behind: float, world: Mapping[str, Any]) -> Action:
+    """What is left to be told of an action after `behind` of its seconds."""
+    w, number = query.plain(world), ACTIONS.index(action.name)
+    if number == POSTURE:
+        return action
+    takes = duration(w.posture, number, action.ahead, action.left, w)
+    share = share_left(number, behind, takes, w)
+    return Action(action.name, share * action.ahead, share * action.left)
+
+
 def trajectory(actions: Iterable[Action], world: Mapping[str, Any]) -> tuple[Pose, ...]:
     """Where a plan leads in a world, by the model's own simulation: the pose now, and after each
-    action."""
+    action that is still to be done."""
     w = query.plain(world)
-    x, y, heading, posture = w.x, w.y, w.heading, w.posture
-    behind, seconds = w.elapsed, 0.0
+    x, y, heading, posture, seconds = w.x, w.y, w.heading, w.posture, 0.0
     poses = [Pose(x, y, heading, posture, 0.0)]
-    for action in actions:
-        number = ("wait", "walk", "turn", "posture").index(action.name)
-        x, y, heading, posture, behind, seconds = perform(
-            x, y, heading, posture, behind, seconds, number, action.ahead, action.left, w
+    for made, action in enumerate(actions):
+        number = ACTIONS.index(action.name)
+        if made < w.done:
+            continue
+        behind = w.elapsed if made == w.done and number == w.current else 0.0
+        x, y, heading, posture, seconds = perform(
+            x, y, heading, posture, seconds, number, action.ahead, action.left, behind, w
         )
         poses.append(Pose(x, y, heading, posture, seconds))
     return tuple(poses)

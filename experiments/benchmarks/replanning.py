@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from planners.nao import Body
-from planners.nao_plan import actions_of, plan, plan_world, trajectory
+from planners.nao import POSTURES, Body
+from planners.nao_plan import actions_of, made_before, plan, plan_world, trajectory
 from planners.query import Operators, Query
 
 OBSTACLE = (0.5, 0.0, 0.2)
@@ -150,14 +150,30 @@ def _straight(timed: Timed) -> bool:
 
 
 def appeared(seed: int, operators: Operators | None = None) -> Recovery:
-    """An obstacle appears when the robot has walked 0.2 m of its straight plan."""
+    """An obstacle appears 0.4 m ahead when the robot has stood up and walked 0.2 m."""
     timed = Timed(sitting(None), seed, operators)
     timed.converge(0.5)
-    timed.query.world.update(
-        x=0.2, posture=4, elapsed=5.0, obstacle_count=1, obstacles=_discs((0.6, 0.0, 0.2))
+    searched = timed.query
+    actions, choices = actions_of(searched.best.choices), searched.best.choices
+    poses = trajectory(actions, dict(searched.world))
+    done = max(i for i, pose in enumerate(poses) if pose.seconds <= 5.0)
+    here = poses[done]
+    start, disc = (here.x + 0.1 * (5.0 - here.seconds), here.y), (0.6, 0.0, 0.2)
+    current = actions[done].name if done < len(actions) else None
+    searched.constrain(made_before(choices, done))
+    now = plan_world(
+        GOAL,
+        pose=(*start, here.heading),
+        posture=POSTURES[here.posture],
+        obstacles=[disc],
+        done=done,
+        current=current,
+        elapsed=5.0 - here.seconds,
+        body=body(),
     )
-    good = least((0.2, 0.0), GOAL, (0.6, 0.0, 0.2), 0.0) + CLOSE
-    return timed.until(lambda: timed.query.value <= good, 1.0)
+    searched.world.update(now)
+    good = least(start, GOAL, disc, 0.0) + CLOSE
+    return timed.until(lambda: searched.value <= good, 1.0)
 
 
 def fallen(seed: int, operators: Operators | None = None) -> Recovery:
@@ -165,7 +181,7 @@ def fallen(seed: int, operators: Operators | None = None) -> Recovery:
     timed = Timed(sitting(), seed, operators)
     timed.converge(0.5)
     start = (0.3, 0.15)
-    timed.query.world.update(x=start[0], y=start[1], heading=0.7, posture=1, elapsed=0.0)
+    timed.query.world.update(x=start[0], y=start[1], heading=0.7, posture=1)
     good = least(start, GOAL, OBSTACLE, 3.0) + CLOSE
     return timed.until(lambda: timed.query.value <= good, 1.0)
 
@@ -181,12 +197,6 @@ def moving(seed: int, operators: Operators | None = None) -> float:
         if timed.seconds > 0.5:
             excess.append(timed.query.value - least((0.0, 0.0), goal, OBSTACLE, 3.0))
     return float(np.mean(excess))
-
-
-def _discs(*discs: tuple[float, float, float]) -> np.ndarray:
-    found = np.zeros((8, 3))
-    found[: len(discs)] = discs
-    return found
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import pytest
 from anytime.errors import AnytimeError
 from experiments.benchmarks.replanning import sitting
 from experiments.benchmarks.rivals import cpp_program
+from planners.nao import STAND
 from planners.query import Operators
 
 OPERATORS = {
@@ -72,7 +73,7 @@ def test_another_world_is_simulated_alike(program, ours, changed):
 
 def test_tables_grow_alike(program):
     """Runs that ask for more choices than there is room for are invalid; then there is room."""
-    world = sitting((9.0, 0.0), posture="Stand", effort=0.0)
+    world = {**sitting(), "goal_x": 9.0, "posture": STAND, "effort": 0.0}
     for seed in SEEDS:
         inputs = (world, OPERATORS["long"], 60, seed, 150)
         one, other = cpp_program.ours(*inputs), cpp_program.run(program, *inputs)

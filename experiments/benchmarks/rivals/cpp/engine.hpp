@@ -14,6 +14,9 @@
 #include "genomes.hpp"
 #include "randomness.hpp"
 
+#define INLINED [[gnu::always_inline]] inline
+#define OUTLINED [[gnu::noinline]]
+
 struct Operators {
     double crossover, line, difference, cloud, pair, structure, immigrants;
     double mutations, smallest_step, largest_step, elites, scouts, exclusion;
@@ -49,59 +52,28 @@ class Query {
     // --- What a model asks for.
 
     template <class Source>
-    bool flip(Source source, double p) {
+    INLINED bool flip(Source source, double p) {
         const std::int64_t cell = asked(names_.number(source), FLIP);
-        double value = genome_[cell];
-        if (value != value) {
-            value = random_.unit() < p ? 1.0 : 0.0;
-        } else if (due()) {
-            value = 1.0 - value;
-        } else {
-            return value != 0.0;
-        }
-        genome_[cell] = value;
-        return value != 0.0;
+        const double value = genome_[cell];
+        if (value == value && !due()) return value != 0.0;
+        return flip_anew(cell, value, p);
     }
 
     template <class Source>
-    std::int64_t randint(Source source, std::int64_t n) {
+    INLINED std::int64_t randint(Source source, std::int64_t n) {
         const std::int64_t cell = asked(names_.number(source), RANDINT);
-        double value = genome_[cell];
-        if (!(0.0 <= value && value < n)) {
-            value = random_.below(n);
-        } else if (due()) {
-            if (random_.unit() < 0.5) {
-                value = random_.below(n);
-            } else {
-                const double near = value + std::floor(step() * n + 0.5);
-                value = 0.0 <= near && near < n ? near : random_.below(n);
-            }
-        } else {
-            return static_cast<std::int64_t>(value);
-        }
-        genome_[cell] = value;
-        return static_cast<std::int64_t>(value);
+        const double value = genome_[cell];
+        if (0.0 <= value && value < n && !due()) return static_cast<std::int64_t>(value);
+        return randint_anew(cell, value, n);
     }
 
     template <class Source>
-    double gaussian(Source name, double mean, double sigma) {
+    INLINED double gaussian(Source name, double mean, double sigma) {
         const std::int64_t source = names_.number(name);
         const std::int64_t cell = asked(source, GAUSSIAN);
-        double value = genome_[cell];
-        if (value != value) {
-            value = mean + sigma * random_.normal();
-        } else if (due()) {
-            if (random_.unit() < REDRAW) {
-                value = mean + sigma * random_.normal();
-            } else {
-                value += sigma * step();
-            }
-        } else {
-            return value;
-        }
-        table_.scales[source] = sigma;
-        genome_[cell] = value;
-        return value;
+        const double value = genome_[cell];
+        if (value == value && !due()) return value;
+        return gaussian_anew(source, cell, value, mean, sigma);
     }
 
     // --- What its user asks for.
@@ -157,17 +129,23 @@ class Query {
     // --- A run.
 
     // The cell of the next call to a source, written down in the log.
-    std::int64_t asked(std::int64_t source, Kind kind) {
+    INLINED std::int64_t asked(std::int64_t source, Kind kind) {
         const std::int64_t at = length_++;
         const std::int64_t index = table_.counts[source]++;
-        std::int64_t cell = index < table_.width ? table_.cell(source, index) : -1;
-        if (__builtin_expect(cell < 0 || at >= table_.longest, false)) {
-            if (cell < 0) cell = table_.cell_of(source, index, kind);
-            if (cell < 0) return overflow(index < table_.width ? FEW_CELLS : NARROW);
-            if (at >= table_.longest) return overflow(SHORT);
+        if (index < table_.width && at < table_.longest) {
+            const std::int64_t cell = table_.cell(source, index);
+            if (cell >= 0) return log_[at] = static_cast<std::int32_t>(cell);
         }
-        log_[at] = static_cast<std::int32_t>(cell);
-        return cell;
+        return asked_anew(at, source, index, kind);
+    }
+
+    // The same for an address without a cell, and where there is no room.
+    OUTLINED std::int64_t asked_anew(std::int64_t at, std::int64_t source, std::int64_t index,
+                                     Kind kind) {
+        const std::int32_t cell = table_.cell_of(source, index, kind);
+        if (cell < 0) return overflow(index < table_.width ? FEW_CELLS : NARROW);
+        if (at >= table_.longest) return overflow(SHORT);
+        return log_[at] = cell;
     }
 
     std::int64_t overflow(Overflow reason) {
@@ -179,10 +157,40 @@ class Query {
     }
 
     // Whether this inherited value is to be mutated.
-    bool due() {
-        if (__builtin_expect(--countdown_ != 0, true)) return false;
+    INLINED bool due() {
+        if (--countdown_ != 0) return false;
         countdown_ = 1 + random_.below(2 * gap_);
         return true;
+    }
+
+    // Values that are drawn or mutated: rarely, so beside the model.
+    OUTLINED bool flip_anew(std::int64_t cell, double value, double p) {
+        value = value == value ? 1.0 - value : random_.unit() < p ? 1.0 : 0.0;
+        genome_[cell] = value;
+        return value != 0.0;
+    }
+
+    OUTLINED std::int64_t randint_anew(std::int64_t cell, double value, std::int64_t n) {
+        if (0.0 <= value && value < n && !(random_.unit() < 0.5)) {
+            const double near = value + std::floor(step() * n + 0.5);
+            value = 0.0 <= near && near < n ? near : random_.below(n);
+        } else {
+            value = random_.below(n);
+        }
+        genome_[cell] = value;
+        return static_cast<std::int64_t>(value);
+    }
+
+    OUTLINED double gaussian_anew(std::int64_t source, std::int64_t cell, double value, double mean,
+                                  double sigma) {
+        if (value != value || random_.unit() < REDRAW) {
+            value = mean + sigma * random_.normal();
+        } else {
+            value += sigma * step();
+        }
+        table_.scales[source] = sigma;
+        genome_[cell] = value;
+        return value;
     }
 
     // A normal step whose size is log-uniform, in units of the spread of what it changes.

@@ -11,7 +11,9 @@ enum Posture { STAND_INIT, CROUCH, SIT, SIT_RELAX, STAND, STAND_ZERO };
 struct World {
     double x, y, heading;
     std::int64_t posture;
-    double goal_x, goal_y, elapsed, drift, effort;
+    double goal_x, goal_y, goal_vx, goal_vy;
+    std::int64_t done, current;
+    double elapsed, drift, effort;
     std::int64_t collision, obstacle_count;
     std::array<std::array<double, 3>, 8> obstacles;
     double speed, turn_rate, step_phase;
@@ -51,45 +53,53 @@ inline Contact first_contact(double x, double y, double dx, double dy, const Wor
 struct State {
     double x, y, heading;
     std::int64_t posture;
-    double behind, seconds;
+    double seconds;
 };
 
+// Seconds that an action takes from a posture; 0 for one that is refused.
+inline double duration(std::int64_t posture, std::int64_t action, double ahead, double left,
+                       const World& w) {
+    if (action == WAIT) return ahead;
+    if (action == POSTURE) return w.posture_seconds[posture][static_cast<std::int64_t>(ahead)];
+    if (!standing(posture)) return 0.0;
+    if (action == WALK) return std::sqrt(ahead * ahead + left * left) / w.speed + w.step_phase;
+    return std::fabs(ahead) / w.turn_rate + w.step_phase;
+}
+
+// What is left of an action after `behind` of its seconds.
+inline double share_left(std::int64_t action, double behind, double takes, const World& w) {
+    if (behind <= 0.0) return 1.0;
+    if (behind >= takes) return 0.0;
+    if (action == WAIT || action == POSTURE) return 1.0 - behind / takes;
+    const double way = takes - w.step_phase;
+    if (way <= 0.0) return 0.0;
+    const double gone = (behind - 0.5 * w.step_phase) / way;
+    return 1.0 - (gone < 0.0 ? 0.0 : gone > 1.0 ? 1.0 : gone);
+}
+
 // One action: where it leads, and the seconds that it takes.
-inline void perform(State& s, std::int64_t action, double ahead, double left, const World& w) {
-    double dx = 0.0, dy = 0.0, angle = 0.0, takes = 0.0;
-    std::int64_t target = s.posture;
-    if (action == WAIT) {
-        takes = ahead;
-    } else if (action == WALK) {
-        if (standing(s.posture)) {
-            const double cosine = std::cos(s.heading), sine = std::sin(s.heading);
-            dx = cosine * ahead - sine * left;
-            dy = sine * ahead + cosine * left;
-            takes = std::sqrt(dx * dx + dy * dy) / w.speed + w.step_phase;
-        }
-    } else if (action == TURN) {
-        if (standing(s.posture)) {
-            angle = ahead;
-            takes = std::fabs(angle) / w.turn_rate + w.step_phase;
-        }
-    } else {
-        target = static_cast<std::int64_t>(ahead);
-        takes = w.posture_seconds[s.posture][target];
-    }
-    if (s.behind >= takes) {
-        s.behind -= takes;
+inline void perform(State& s, std::int64_t action, double ahead, double left, double behind,
+                    const World& w) {
+    const double takes = duration(s.posture, action, ahead, left, w);
+    const double share = share_left(action, behind, takes, w);
+    s.seconds += takes > behind ? takes - behind : 0.0;
+    if (action == WAIT) return;
+    if (action == POSTURE) {
+        const auto target = static_cast<std::int64_t>(ahead);
+        if (!standing(s.posture) && standing(target)) s.heading += share * w.drift;
+        s.posture = target;
         return;
     }
-    const double rest = 1.0 - s.behind / takes;
-    dx *= rest, dy *= rest, angle *= rest;
-    s.behind = 0.0;
-    s.seconds += rest * takes;
-    if (!standing(s.posture) && standing(target)) s.heading += w.drift;
-    s.heading += angle;
+    if (!standing(s.posture)) return;
+    if (action == TURN) {
+        s.heading += share * ahead;
+        return;
+    }
+    const double cosine = share * std::cos(s.heading), sine = share * std::sin(s.heading);
+    const double dx = cosine * ahead - sine * left, dy = sine * ahead + cosine * left;
     const Contact contact = first_contact(s.x, s.y, dx, dy, w);
     if (contact.which < 0) {
         s.x += dx, s.y += dy;
-        s.posture = target;
         return;
     }
     s.posture = CROUCH;
@@ -104,7 +114,8 @@ inline void perform(State& s, std::int64_t action, double ahead, double left, co
 // A plan of any length, and what it costs.
 template <class Names, class Rng>
 double plan(Rng& rng, const World& w) {
-    State s{w.x, w.y, w.heading, w.posture, w.elapsed, 0.0};
+    State s{w.x, w.y, w.heading, w.posture, 0.0};
+    std::int64_t made = 0;
     while (rng.flip(Names::more, 0.7)) {
         const std::int64_t action = rng.randint(Names::action, 4);
         double ahead = 0.0, left = 0.0;
@@ -118,8 +129,10 @@ double plan(Rng& rng, const World& w) {
         } else {
             ahead = rng.randint(Names::posture, 6);
         }
-        perform(s, action, ahead, left, w);
+        if (++made <= w.done) continue;
+        perform(s, action, ahead, left, made == w.done + 1 && action == w.current ? w.elapsed : 0.0, w);
     }
-    const double ex = s.x - w.goal_x, ey = s.y - w.goal_y;
+    const double ex = s.x - w.goal_x - w.goal_vx * s.seconds;
+    const double ey = s.y - w.goal_y - w.goal_vy * s.seconds;
     return std::sqrt(ex * ex + ey * ey) + w.effort * s.seconds;
 }
