@@ -97,7 +97,7 @@ def nao_sim(options: argparse.Namespace) -> Answer:
     from anytime.command_line import as_json
     from monitor.robots.nao_faults import read_fault
     from monitor.robots.nao_scenes import read_scene
-    from monitor.robots.naoqi_server import serve, until_stdin_closes
+    from monitor.robots.naoqi_server import end_without_teardown, serve, until_stdin_closes
 
     if options.port > 65535:
         raise AnytimeError(f"port is {options.port}; it must be 0 (any) to 65535")
@@ -117,7 +117,12 @@ def nao_sim(options: argparse.Namespace) -> Answer:
 
     rate = None if options.lockstep else options.rate
     done = until_stdin_closes()
-    serve(scene, port=options.port, rate=rate, faults=faults, ready=ready, done=done)
+    try:
+        serve(scene, port=options.port, rate=rate, faults=faults, ready=ready, done=done)
+    except KeyboardInterrupt:
+        end_without_teardown(130)
+        raise
+    end_without_teardown(0)
     return Answer(f"served {scene.name} at {told[0]}", {"scene": scene.name, "url": told[0]})
 
 

@@ -44,10 +44,6 @@ class Odometry:
         self._pose = raw if self._anchor is None else compose(self._anchor, raw)
         return self._pose
 
-    def forget(self) -> None:
-        """The next pose is told by a robot that may have started anew."""
-        self.changed = -math.inf
-
     def _leaps(self, before: Pose, after: Pose, seconds: float) -> bool:
         far = math.dist(before[:2], after[:2])
         turned = abs(math.remainder(after[2] - before[2], math.tau))

@@ -75,9 +75,6 @@ class Authenticator:
 class AuthenticatorFactory:
     """Makes an `Authenticator` for every connection, as libqi wants it."""
 
-    authVersionMajor = 1  # noqa: N815 - libqi's name
-    authVersionMinor = 0  # noqa: N815 - libqi's name
-
     def __init__(self, user: str, token: str) -> None:
         self._user, self._token = user, token
 
@@ -119,7 +116,7 @@ class Link:
         self.drop()
         self._pause = min(max(2 * self._pause, _SHORTEST), _LONGEST)
         session = self._qi.Session()
-        token = password()
+        token = password() if self.url.startswith("tcps://") else None  # never in the clear
         if token is not None:
             session.setClientAuthenticatorFactory(AuthenticatorFactory(self._user, token))
         try:
@@ -173,6 +170,15 @@ class Link:
             self._due = time.perf_counter() + self._pause
             session.close(_async=True)  # to a silent peer it would block
 
+    def close(self, service: str, method: str, *arguments: Any) -> None:
+        """Let go of the robot, after a last call of a service that it may have."""
+        try:
+            if self.connected and self.has(service):
+                self.call(service, method, *arguments)
+        except (LinkLostError, RemoteError):
+            pass  # nothing is expected of it any more
+        self.drop()
+
     def ended(self, future: Any) -> bool:
         """Whether the answer to a call, or an error, is there."""
         return future.wait(0) != self._qi.FutureState.Running
@@ -182,4 +188,4 @@ class Link:
         if not self.connected or lines[0].startswith(_LOST):
             self.drop()
             return LinkLostError(f"no link to {self.url}: {lines[0]}")
-        return RemoteError(lines[-1])
+        return RemoteError(lines[0])

@@ -5,7 +5,9 @@ What there is, is listed in docs/nao.md; calling what there is not, fails at the
 
 from __future__ import annotations
 
+import atexit
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -298,6 +300,20 @@ def serve(
     finally:
         stage.close()
         session.close()
+
+
+def end_without_teardown(code: int) -> None:
+    """Let this process end as usual, but with the interpreter as it is.
+
+    A thread of libqi that lets go of a service while Python is torn down would abort the process.
+    """
+
+    def end() -> None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+    atexit.register(end)
 
 
 def until_stdin_closes() -> threading.Event:
