@@ -30,8 +30,9 @@ FLAGS = (
     # sqrt and floor as single instructions: nobody reads errno or the floating-point flags
     *("-fno-math-errno", "-fno-trapping-math"),
     # a multiplication and an addition fused into one round once instead of twice: other bits than
-    # numba's and CPython's, so other choices
-    "-ffp-contract=off",
+    # numba's and CPython's, so other choices. The second switch is for g++ 12, which fuses them
+    # (vfmaddsub) in this pass although the first forbids it; here the pass gains nothing.
+    *("-ffp-contract=off", "-fno-tree-slp-vectorize"),
 )
 
 WARM_UP = 100

@@ -1,10 +1,8 @@
 // How the model of plan.hpp names its sources: by numbers that the compiler knows, or by strings.
 #pragma once
 
-#include <functional>
-#include <map>
-#include <string>
 #include <string_view>
+#include <unordered_map>
 
 // Each source is a number in the code.
 struct Slots {
@@ -22,7 +20,7 @@ struct Tags {
 
     int number(std::string_view tag) const { return numbers.find(tag)->second; }
 
-    const std::map<std::string, int, std::less<>> numbers = {
+    const std::unordered_map<std::string_view, int> numbers = {
         {"more", 0}, {"action", 1}, {"wait", 2}, {"walk", 3}, {"turn", 4}, {"posture", 5},
     };
 };
