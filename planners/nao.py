@@ -36,7 +36,7 @@ class Body:
     speed: of walking. turn_rate: of turning on the spot, sustained. step_phase: seconds that a
     walk or a turn takes beside the way, to start and to stop. radius: of the disc that it sweeps,
     arms included. posture_seconds: float [6, 6], from row to column. fall_seconds: what a fall
-    costs until it can be told to stand up.
+    costs until it can be told to stand up. command_seconds: what each command costs beside.
     """
 
     speed: float = 0.095
@@ -45,3 +45,4 @@ class Body:
     radius: float = 0.15
     posture_seconds: NDArray[np.float64] = field(default_factory=_posture_seconds)
     fall_seconds: float = 10.0
+    command_seconds: float = 0.1

@@ -35,7 +35,7 @@ def plan_world(
     posture: str = "Sit",
     obstacles: Sequence[tuple[float, float, float]] = (),
     done: int = 0,
-    current: str | None = None,
+    current: Action | None = None,
     elapsed: float = 0.0,
     goal_velocity: tuple[float, float] = (0.0, 0.0),
     drift: float = 0.0,
@@ -47,9 +47,9 @@ def plan_world(
 
     goal: (x, y) in world, metres. pose: (x, y, heading) in world. obstacles: discs (x, y, radius)
     in world, the robot's own radius included. done: actions of the plan that are complete, which
-    `pose` and `posture` contain. current, elapsed: the name of the action that goes on, if any, and
-    the seconds since it began. goal_velocity: metres a second. drift: radians by which standing up
-    turns the robot. effort: of a second, in metres of distance. collision: "stops", or "paper"
+    `pose` and `posture` contain. current, elapsed: the action that goes on, if any, and the seconds
+    since it began; a plan that goes on with it is spared them. goal_velocity: metres a second.
+    drift: radians by which standing up turns the robot. effort: of a second, in metres of distance. collision: "stops", or "paper"
     for the paper's rule.
     Raises AnytimeError for an unknown posture or rule and for too many obstacles.
     """
@@ -76,7 +76,9 @@ def plan_world(
         "goal_vx": goal_velocity[0],
         "goal_vy": goal_velocity[1],
         "done": done,
-        "current": -1 if current is None else ACTIONS.index(current),
+        "current": -1 if current is None else ACTIONS.index(current.name),
+        "current_ahead": 0.0 if current is None else current.ahead,
+        "current_left": 0.0 if current is None else current.left,
         "elapsed": elapsed,
         "drift": drift,
         "effort": effort,
@@ -88,6 +90,7 @@ def plan_world(
         "step_phase": body.step_phase,
         "posture_seconds": np.array(body.posture_seconds),
         "fall_seconds": body.fall_seconds,
+        "command_seconds": body.command_seconds,
     }
 
 
@@ -191,6 +194,11 @@ def perform(
     return x + touch * dx, y + touch * dy, heading, CROUCH, seconds + w.fall_seconds
 
 
+def going_on(action: int, ahead: float, left: float, w: Any) -> bool:
+    """Whether this is the very action that goes on; another one would begin now."""
+    return action == w.current and ahead == w.current_ahead and left == w.current_left
+
+
 def objective(x: float, y: float, seconds: float, w: Any) -> float:
     """Metres from where the goal will be then, plus the effort of the seconds. [PRP16] §3."""
     ex = x - w.goal_x - w.goal_vx * seconds
@@ -217,10 +225,12 @@ def plan(rng: Any, w: Any) -> float:
         made += 1
         if made <= w.done:
             continue
-        behind = w.elapsed if made == w.done + 1 and action == w.current else 0.0
+        goes_on = made == w.done + 1 and going_on(action, ahead, left, w)
+        behind = w.elapsed if goes_on else 0.0
         x, y, heading, posture, seconds = perform(
             x, y, heading, posture, seconds, action, ahead, left, behind, w
         )
+        seconds += w.command_seconds
     return objective(x, y, seconds, w)
 
 
@@ -275,16 +285,6 @@ def made_before(choices: Choices, done: int) -> Choices:
     return choices.first(turns[done] if done < len(turns) else len(choices))
 
 
-def remaining(action: Action, behind: float, world: Mapping[str, Any]) -> Action:
-    """What is left to be told of an action after `behind` of its seconds."""
-    w, number = query.plain(world), ACTIONS.index(action.name)
-    if number == POSTURE:
-        return action
-    takes = duration(w.posture, number, action.ahead, action.left, w)
-    share = share_left(number, behind, takes, w)
-    return Action(action.name, share * action.ahead, share * action.left)
-
-
 def trajectory(actions: Iterable[Action], world: Mapping[str, Any]) -> tuple[Pose, ...]:
     """Where a plan leads in a world, by the model's own simulation: the pose now, and after each
     action that is still to be done."""
@@ -295,9 +295,11 @@ def trajectory(actions: Iterable[Action], world: Mapping[str, Any]) -> tuple[Pos
         number = ACTIONS.index(action.name)
         if made < w.done:
             continue
-        behind = w.elapsed if made == w.done and number == w.current else 0.0
+        goes_on = made == w.done and going_on(number, action.ahead, action.left, w)
+        behind = w.elapsed if goes_on else 0.0
         x, y, heading, posture, seconds = perform(
             x, y, heading, posture, seconds, number, action.ahead, action.left, behind, w
         )
+        seconds += w.command_seconds
         poses.append(Pose(x, y, heading, posture, seconds))
     return tuple(poses)

@@ -32,7 +32,13 @@ def body() -> Body:
     """The NAO of the paper's simulation: 10 cm/s, and 3 s from any posture to any other."""
     seconds = np.full((6, 6), 3.0)
     np.fill_diagonal(seconds, 0.0)
-    return Body(speed=0.1, step_phase=0.0, posture_seconds=seconds, fall_seconds=20.0)
+    return Body(
+        speed=0.1,
+        step_phase=0.0,
+        posture_seconds=seconds,
+        fall_seconds=20.0,
+        command_seconds=0.0,
+    )
 
 
 def sitting(disc: Disc | None = OBSTACLE) -> dict[str, Any]:
@@ -159,7 +165,7 @@ def appeared(seed: int, operators: Operators | None = None) -> Recovery:
     done = max(i for i, pose in enumerate(poses) if pose.seconds <= 5.0)
     here = poses[done]
     start, disc = (here.x + 0.1 * (5.0 - here.seconds), here.y), (0.6, 0.0, 0.2)
-    current = actions[done].name if done < len(actions) else None
+    current = actions[done] if done < len(actions) else None
     searched.constrain(made_before(choices, done))
     now = plan_world(
         GOAL,

@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Protocol
 
-from monitor.robots.nao_body import NaoBody
+from monitor.robots.nao_body import Reading
 from sensing.sonar import PERIOD, Sonars
 from sensing.sonar_grid import Echoes, SonarMap
 
 _MARGIN = 1e-6  # seconds that sums of times may be off
+
+
+class Heard(Protocol):
+    """What is asked of a body that one listens with: a part of `NaoBody`."""
+
+    def now(self) -> float: ...
+
+    def wait(self, seconds: float) -> None: ...
+
+    def read(self) -> Reading: ...
 
 
 class Hearing:
@@ -17,7 +28,7 @@ class Hearing:
     known: the map to go on with; whoever takes over a better one sets it.
     """
 
-    def __init__(self, body: NaoBody, sonars: Sonars, known: SonarMap | None = None) -> None:
+    def __init__(self, body: Heard, sonars: Sonars, known: SonarMap | None = None) -> None:
         self.body = body
         self.sonars = sonars
         x, y, _ = body.read().pose_in_world

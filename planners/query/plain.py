@@ -23,6 +23,7 @@ class Sources:
         self.numbers: dict[str, int] = {}
         self.kinds: dict[str, str] = {}
         self.at_root: dict[str, int] = {}  # streams that have room, by source
+        self._addresses: dict[int, tuple[tuple[str, int], str]] = {}  # by cell
 
     def expect(self, text: Text) -> None:
         """Number what a model's text names, as its native form has it."""
@@ -65,6 +66,11 @@ class Sources:
 
     def address_of(self, cell: int) -> tuple[tuple[str, int], str]:
         """The address of a cell, and its distribution."""
+        if cell not in self._addresses:
+            self._addresses[cell] = self._found_address(cell)
+        return self._addresses[cell]
+
+    def _found_address(self, cell: int) -> tuple[tuple[str, int], str]:
         blocks = self.memory.blocks
         stream, call, kind = (int(n) for n in blocks["homes"][cell])
         names = list(self.numbers)

@@ -13,12 +13,13 @@ struct World {
     std::int64_t posture;
     double goal_x, goal_y, goal_vx, goal_vy;
     std::int64_t done, current;
+    double current_ahead, current_left;
     double elapsed, drift, effort;
     std::int64_t collision, obstacle_count;
     std::array<std::array<double, 3>, 8> obstacles;
     double speed, turn_rate, step_phase;
     std::array<std::array<double, 6>, 6> posture_seconds;
-    double fall_seconds;
+    double fall_seconds, command_seconds;
 };
 
 inline bool standing(std::int64_t posture) {
@@ -130,7 +131,10 @@ double plan(Rng& rng, const World& w) {
             ahead = rng.randint(Names::posture, 6);
         }
         if (++made <= w.done) continue;
-        perform(s, action, ahead, left, made == w.done + 1 && action == w.current ? w.elapsed : 0.0, w);
+        const bool goes_on = made == w.done + 1 && action == w.current
+                             && ahead == w.current_ahead && left == w.current_left;
+        perform(s, action, ahead, left, goes_on ? w.elapsed : 0.0, w);
+        s.seconds += w.command_seconds;
     }
     const double ex = s.x - w.goal_x - w.goal_vx * s.seconds;
     const double ey = s.y - w.goal_y - w.goal_vy * s.seconds;

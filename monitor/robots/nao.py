@@ -1,0 +1,375 @@
+"""A NAO that executes its plan while the plan is still being improved. [PRP16] §4."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+from anytime.clocks import Clock
+from monitor.endings import Ending
+from monitor.missions import Energy
+from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
+from monitor.robots.nao_hearing import Hearing
+from monitor.robots.nao_planning import Errand, new_query
+from monitor.robots.nao_scenes import Goal
+from monitor.states import Situation
+from planners import nao_plan
+from planners.nao import POSTURES, STANDING, Body
+from planners.nao_plan import (
+    MOST_OBSTACLES,
+    actions_of,
+    made_before,
+    plan_world,
+    trajectory,
+)
+from planners.query import Solution
+from sensing.sonar import Sonars
+from sensing.sonar_map import SonarMap, obstacles
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What is believed of how far standing up turns the robot: a normal posterior, in radians.
+
+    Each stand-up reports its own turn up to `noise`. [PRP16] §4: +0.13 rad, both times.
+    """
+
+    mean: float = 0.0
+    variance: float = 0.05**2
+    noise: float = 0.02
+
+    def learn(self, turned: float) -> Drift:
+        """The posterior after one more stand-up."""
+        gain = self.variance / (self.variance + self.noise**2)
+        return replace(
+            self,
+            mean=self.mean + gain * (turned - self.mean),
+            variance=(1.0 - gain) * self.variance,
+        )
+
+
+@dataclass(frozen=True)
+class Manner:
+    """How a NAO is careful.
+
+    tolerance: metres from the goal that are near enough. threshold: by how much, in metres, another
+    plan must be better to take the place of the one in execution. margin: metres that it keeps from
+    what it hears, beside its own radius. falls: after so many it gives up. patience: seconds
+    without a plan that would bring it nearer before it says that it is blocked.
+    """
+
+    tolerance: float = 0.03
+    threshold: float = 0.03
+    margin: float = 0.05
+    falls: int = 3
+    patience: float = 8.0
+
+
+@dataclass
+class _Execution:
+    """A plan in execution, action by action.
+
+    done: actions that are complete. began: when the one that goes on began, of whatever plan it
+    was then. heading: of the robot then. rises: whether it stands up.
+    """
+
+    solution: Solution
+    actions: tuple[nao_plan.Action, ...]
+    done: int = 0
+    began: float = 0.0
+    running: Action | None = None
+    heading: float = 0.0
+    rises: bool = False
+
+    @property
+    def current(self) -> nao_plan.Action | None:
+        return self.actions[self.done] if self.done < len(self.actions) else None
+
+
+NOTHING = {("more", 0): False}
+"""The plan to do nothing."""
+
+
+class NaoRobot:
+    """A NAO with a goal, on a clock: what the monitor runs. Implements `monitor.bodies.Robot`.
+
+    A frame is a time of thinking. The plan goes on meanwhile, and `begin` takes up another one if
+    it is better by a threshold, in the newest world, from the current moment on.
+    """
+
+    def __init__(
+        self,
+        body: NaoBody,
+        clock: Clock,
+        goal: Goal,
+        energy: Energy,
+        *,
+        sonars: Sonars | None = None,
+        figures: Body | None = None,
+        manner: Manner | None = None,
+        drift: Drift | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.body, self.clock, self.goal = body, clock, goal
+        self.figures, self.manner = figures or Body(), manner or Manner()
+        self.drift = drift or Drift()
+        self.falls = 0
+        self.switches = 0
+        self.reading = body.read()
+        self._energy_model = energy
+        self._energy = self._driven = 0.0
+        self._since = self._presented = clock.now()
+        self._hopeful = self._since  # when a plan last brought it nearer
+        self._execution: _Execution | None = None
+        self._posture = "Crouch"  # the last one that had a name
+        self.hearing = Hearing(self, sonars or Sonars())
+        self.query = new_query(self._world(self.hearing.known), seed)
+        self._interrupted = False
+        self._ending: Ending | None = None
+        self._track: list[tuple[float, float, float]] = [self.reading.pose_in_world]
+        self._objective: list[tuple[float, float]] = []
+
+    # --- A body that is looked after: whoever lets its time pass moves the plan on.
+
+    def now(self) -> float:
+        return self.body.now()
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass, at most a tenth of a second between two looks at the plan."""
+        left = seconds
+        while left > 0:
+            part = min(left, 0.02)
+            self.body.wait(part)
+            self.attend()
+            left -= part
+
+    def read(self) -> Reading:
+        return self.body.read()
+
+    # --- What the monitor asks for.
+
+    def inputs(self) -> Mapping[str, Any]:
+        self.attend()
+        return {
+            "sonar": self.hearing,
+            "errand": Errand(lambda: self.query, self._world, self.attend),
+        }
+
+    def situation(self) -> Situation:
+        self.attend()
+        return Situation(self._energy, max(self._apart(), 1e-3), 0.0, False, self._ending)
+
+    def begin(self, plan: Solution, speed: float) -> None:
+        """Take up a plan if none is in execution, or if it is better by the threshold."""
+        self.attend()
+        if self._ending is not None:
+            return
+        execution = self._execution
+        if execution is not None:  # it may come a little nearer to obstacles than a new one
+            self.query.world.update(self._world(self.hearing.known, 0.4 * self.manner.margin))
+            value_now = self.query.value_of(execution.solution.choices)
+        self.query.world.update(self._world(self.hearing.known))
+        value = self.query.value_of(plan.choices)
+        if execution is not None:
+            self._objective.append((self.clock.now(), value_now))
+            if value >= value_now - self.manner.threshold:
+                return
+            self.switches += 1
+        elif value >= self.query.value_of(NOTHING) - self.manner.threshold:
+            return
+        self._hopeful = self.clock.now()
+        self._start(plan)
+
+    def change_speed(self, speed: float) -> None:
+        """A NAO walks at its own speed."""
+
+    def learn(self, plan: Solution) -> None:
+        """Nothing to do: what was heard is kept by whoever listens."""
+
+    def complete(self) -> None:
+        """A frame ends with its thinking; the plan goes on."""
+        self.attend()
+
+    def work(self, seconds: float) -> None:
+        self.wait(seconds)
+
+    def stop(self) -> None:
+        self.body.stop()
+        self._execution = None
+
+    def driven(self) -> float:
+        self.attend()
+        return self._driven
+
+    def story(self) -> Mapping[str, Any]:
+        """Of the frame just ended: poses [m, 3] by odometry, the objective of the plan in execution
+        over time [k, 2], where the plan leads [n, 2], discs believed [o, 3], sonars, falls."""
+        track, self._track = self._track, self._track[-1:]
+        objective, self._objective = self._objective, []
+        world = dict(self.query.world)
+        count = world["obstacle_count"]
+        led = trajectory(self._execution.actions, world) if self._execution else ()
+        return {
+            "path": [list(pose) for pose in track],
+            "objective": [list(pair) for pair in objective],
+            "plan": [[pose.x, pose.y] for pose in led],
+            "planned": 0.0,
+            "length": sum(math.dist(a[:2], b[:2]) for a, b in pairwise(track)),
+            "obstacles": [list(map(float, disc)) for disc in world["obstacles"][:count]],
+            "sonars": [None if math.isnan(s) else min(s, 9.99) for s in self.reading.sonars],
+            "posture": self.reading.posture,
+            "switches": self.switches,
+            "falls": self.falls,
+        }
+
+    def picture(self) -> Mapping[str, Any]:
+        """What was heard: probabilities of being blocked [rows, columns]."""
+        return {"belief": self.hearing.known.probabilities()}
+
+    # --- Execution.
+
+    def attend(self) -> None:
+        """Bring everything up to now: energy, the plan's actions, falls, the ending."""
+        now = self.clock.now()
+        passed, self._since = now - self._since, now
+        try:
+            before, self.reading = self.reading, self.body.read()
+        except LinkLostError:
+            self._ending = self._ending or Ending.LINK_LOST
+            self._execution = None
+            return
+        moving = self._execution is not None
+        power = float(self._energy_model.power(self.figures.speed))
+        self._energy += passed * (power if moving else self._energy_model.idle)
+        self._driven += passed * moving
+        if math.dist(self.reading.pose_in_world[:2], self._track[-1][:2]) > 0.01:
+            self._track.append(self.reading.pose_in_world)
+        if self.reading.fallen and not before.fallen:
+            self._fell()
+        elif self._execution is not None:
+            self._go_on(self._execution)
+        if self._execution is None and self._ending is None:
+            self._judge(now)
+
+    def _judge(self, now: float) -> None:
+        """Whether it has arrived, or given up."""
+        standing = self.reading.posture in {POSTURES[posture] for posture in STANDING}
+        if standing and self._apart() <= self.manner.tolerance:
+            self._ending = Ending.REACHED
+        elif now - self._hopeful > self.manner.patience and not self.reading.fallen:
+            self._ending = Ending.REACHED if self._near() else Ending.BLOCKED
+
+    def _near(self) -> bool:
+        return self._apart() <= 2 * self.manner.tolerance
+
+    def _fell(self) -> None:
+        self.falls += 1
+        self._drop()
+        if self.falls > self.manner.falls:
+            self._ending = Ending.FALLEN
+
+    def _start(self, plan: Solution) -> None:
+        """Execute a plan from the current moment on: what is executed is skipped, the action that
+        goes on in part."""
+        before = self._execution
+        made = _Execution(plan, actions_of(plan.choices))
+        if before is not None:
+            made.done = before.done
+            if made.current == before.current:  # nothing changes before its end
+                made.began, made.running = before.began, before.running
+                made.heading, made.rises = before.heading, before.rises
+        self._execution = made
+        self._go_on(made)
+
+    def _go_on(self, execution: _Execution) -> None:
+        """Begin the next action when one has ended."""
+        while execution.running is None or (outcome := execution.running.poll()) is not None:
+            if execution.running is not None:
+                if outcome not in (Outcome.DONE, Outcome.REFUSED):
+                    self._drop()
+                    if outcome is Outcome.LINK_LOST:
+                        self._ending = Ending.LINK_LOST
+                    return
+                if execution.rises and outcome is Outcome.DONE:
+                    turned = self.reading.pose_in_world[2] - execution.heading
+                    self.drift = self.drift.learn(math.remainder(turned, math.tau))
+                execution.done += 1
+            action = execution.current
+            if action is None:
+                self._drop()
+                return
+            self.query.constrain(made_before(execution.solution.choices, execution.done))
+            execution.began = self.clock.now()
+            execution.heading = self.reading.pose_in_world[2]
+            execution.rises = self._rises(action)
+            execution.running = self._command(action)
+
+    def _drop(self) -> None:
+        """No plan is in execution any more."""
+        self._execution = None
+        self.query.constrain({})
+
+    def _rises(self, action: nao_plan.Action) -> bool:
+        return (
+            action.name == "posture"
+            and int(action.ahead) in STANDING
+            and self.reading.posture not in {POSTURES[posture] for posture in STANDING}
+        )
+
+    def _command(self, action: nao_plan.Action) -> Action:
+        if action.name == "walk":
+            return self.body.walk(action.ahead, action.left, 0.0)
+        if action.name == "turn":
+            return self.body.walk(0.0, 0.0, action.ahead)
+        if action.name == "posture":
+            return self.body.posture(POSTURES[int(action.ahead)])
+        return _Pause(self.clock, action.ahead)
+
+    # --- What plans are simulated in.
+
+    def _world(self, heard: SonarMap, margin: float | None = None) -> dict[str, Any]:
+        """The world now: where the robot is, what it heard, and how much of its plan is done."""
+        margin = self.manner.margin if margin is None else margin
+        self.hearing.known = heard
+        reading, execution = self.reading, self._execution
+        if reading.posture in POSTURES:
+            self._posture = reading.posture
+        elif reading.posture == LYING:
+            self._posture = "Crouch"
+        action = execution.current if execution else None
+        grown = self.figures.radius + margin
+        discs = [(x, y, r + grown) for x, y, r in obstacles(heard)[:MOST_OBSTACLES].tolist()]
+        return plan_world(
+            self.goal.place(self.clock.now() - self._presented),
+            goal_velocity=self.goal.velocity,
+            pose=reading.pose_in_world,
+            posture=self._posture,
+            obstacles=discs,
+            done=execution.done if execution else 0,
+            current=action,
+            elapsed=self.clock.now() - execution.began if execution and action else 0.0,
+            drift=self.drift.mean,
+            body=self.figures,
+        )
+
+    def _apart(self) -> float:
+        """Metres to the goal, by odometry."""
+        goal = self.goal.place(self.clock.now() - self._presented)
+        return math.dist(self.reading.pose_in_world[:2], goal)
+
+
+class _Pause:
+    """Waiting, as an action."""
+
+    def __init__(self, clock: Clock, seconds: float) -> None:
+        self._clock = clock
+        self._until = clock.now() + seconds
+
+    def poll(self) -> Outcome | None:
+        return Outcome.DONE if self._clock.now() >= self._until - 1e-9 else None
+
+    def cancel(self) -> None:
+        self._until = self._clock.now()
