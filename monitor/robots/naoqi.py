@@ -21,7 +21,7 @@ from planners.nao import POSTURES, STANDING, Body
 _FARTHEST = 100.0  # metres or radians that one walk may go
 _PROBING = 0.05  # seconds of real time between two looks at a robot that does something
 _FROZEN = 3.0  # seconds without a change of the pose after which who walks does not
-_NEAR = 0.03  # metres of a walk that are not worth a piece of their own
+_NEAR = 0.05  # metres of a walk that are not worth a piece of their own
 _NAME = "anytime"  # of us, as a subscriber
 _STOPPING = ("ALMotion", "ALRobotPosture")
 _UPRIGHT = tuple(POSTURES[index] for index in STANDING)
@@ -186,7 +186,7 @@ class NaoqiBody:
     def _decide(self, action: NaoqiAction, look: Look, at: float, over: bool) -> None:
         """Go on with an action, or end it. over: whether its call has been answered."""
         action.rising = action.rising and look.fallen
-        frozen = at - max(self.odometry.changed, action.begun) > _FROZEN
+        frozen = at - max(self.odometry.changed, action.called) > _FROZEN
         if look.fallen and not action.rising:
             self._end(Outcome.FELL)
         elif at > action.deadline or (frozen and look.moving and action.way):
@@ -198,7 +198,7 @@ class NaoqiBody:
                 if self.link.ended(action.future) and self.link.value(action.future) is False:
                     self._end(Outcome.FAILED)  # somebody else has stopped it since it was seen
                 else:
-                    self._tell_piece(action, action.way, look.pose)
+                    self._tell_piece(action, action.way, look.pose, self.now() - at)
         elif over:
             self._judge(action, self.link.value(action.future), look)
 
@@ -213,7 +213,7 @@ class NaoqiBody:
             trusted = piece.length > 0.1 and piece.jumps == self.odometry.jumps
             if trusted and piece.rest - rest < 0.2 * piece.length:
                 self._end(Outcome.FAILED)  # motors without stiffness, for one
-            elif piece.beyond > _NEAR:
+            elif action.way.length > self._segment and rest > _NEAR:
                 self._tell_piece(action, action.way, look.pose)
             else:
                 self._end(Outcome.DONE)
@@ -221,16 +221,18 @@ class NaoqiBody:
             taken = answer is True or look.posture == action.name
             self._end(Outcome.DONE if taken else Outcome.FAILED)
 
-    def _tell_piece(self, action: NaoqiAction, way: Way, here: Pose) -> None:
-        """Tell the next piece of a walk."""
+    def _tell_piece(self, action: NaoqiAction, way: Way, here: Pose, walked: float = 0.0) -> None:
+        """Tell the next piece of a walk; walked: for how long the robot has gone on from here."""
         told = way.x, way.y, way.turn
         rest = length = way.length
         if length > self._segment:
             x, y, turn = way.rest(here)
             rest = math.hypot(x, y)
-            length = min(rest, self._segment)
+            left = max(0.0, rest - self.body.speed * walked)
+            length = min(left, self._segment)
             share = length / max(rest, _NEAR)
             told = x * share, y * share, turn * share
+            rest = left
         action.piece = Piece(length, rest, self.odometry.jumps)
         action.calls.append(("ALMotion", "moveTo", told))
         self._call_next(action)
@@ -239,7 +241,7 @@ class NaoqiBody:
         """Make the next call of an action."""
         service, method, arguments = action.calls.pop(0)
         action.future = self.link.send(service, method, *arguments)
-        self._probe = None
+        action.called, self._probe = self.now(), None
         if self._lockstep and action.calls:
             self.link.value(action.future)
             self._call_next(action)
@@ -252,8 +254,7 @@ class NaoqiBody:
         if before is not None and (before.way is None) != (action.way is None):
             self._halt()
         self._end(Outcome.CANCELLED)
-        action.begun = self.now()
-        action.deadline = action.begun + 5.0 + 2.0 * seconds
+        action.deadline = self.now() + 5.0 + 2.0 * seconds
         self._action = action
         return action
 

@@ -69,11 +69,11 @@ class NaoqiAction:
     way: Way | None = None  # of a walk
     name: str = ""  # of a posture
     rising: bool = False  # it began on the floor, and the robot has not got up yet
-    begun: float = 0.0
     deadline: float = math.inf
     calls: list[Call] = field(default_factory=list)  # still to be made
     future: Any = None  # of the call in execution
-    number: int = 0  # of that call, in lock-step
+    called: float = 0.0  # when it was made
+    number: int = 0  # of it, in lock-step
     piece: Piece | None = None
 
     def poll(self) -> Outcome | None:
