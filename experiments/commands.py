@@ -13,7 +13,7 @@ from anytime.errors import AnytimeError
 if TYPE_CHECKING:
     from experiments.benchmarks.figures import Benchmark
 
-BENCHMARKS = ("planner", "compiler", "mission", "query")
+BENCHMARKS = ("planner", "compiler", "mission", "query", "nao")
 
 
 def declare(commands: Any) -> None:

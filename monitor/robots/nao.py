@@ -58,7 +58,8 @@ class Manner:
     tolerance: metres from the goal that are near enough. threshold: by how much, in metres, another
     plan must be better to take the place of the one in execution. margin: metres that it keeps from
     what it hears, beside its own radius. falls: after so many it gives up. patience: seconds
-    without a plan that would bring it nearer before it says that it is blocked.
+    without a plan that would bring it nearer before it says that it is blocked. plans: how many it
+    takes up at most.
     """
 
     tolerance: float = 0.03
@@ -66,6 +67,7 @@ class Manner:
     margin: float = 0.05
     falls: int = 3
     patience: float = 8.0
+    plans: int | None = None
 
 
 @dataclass
@@ -117,6 +119,7 @@ class NaoRobot:
         self.figures, self.manner = figures or Body(), manner or Manner()
         self.drift = drift or Drift()
         self.falls = 0
+        self.plans = 0
         self.switches = 0
         self.reading = body.read()
         self._energy_model = energy
@@ -160,12 +163,12 @@ class NaoRobot:
 
     def situation(self) -> Situation:
         self.attend()
-        return Situation(self._energy, max(self._apart(), 1e-3), 0.0, False, self._ending)
+        return Situation(self._energy, max(self.apart(), 1e-3), 0.0, False, self._ending)
 
     def begin(self, plan: Solution, speed: float) -> None:
         """Take up a plan if none is in execution, or if it is better by the threshold."""
         self.attend()
-        if self._ending is not None:
+        if self._ending is not None or self.plans == self.manner.plans:
             return
         execution = self._execution
         if execution is not None:  # it may come a little nearer to obstacles than a new one
@@ -181,6 +184,7 @@ class NaoRobot:
         elif value >= self.query.value_of(NOTHING) - self.manner.threshold:
             return
         self._hopeful = self.clock.now()
+        self.plans += 1
         self._start(plan)
 
     def change_speed(self, speed: float) -> None:
@@ -257,13 +261,13 @@ class NaoRobot:
     def _judge(self, now: float) -> None:
         """Whether it has arrived, or given up."""
         standing = self.reading.posture in {POSTURES[posture] for posture in STANDING}
-        if standing and self._apart() <= self.manner.tolerance:
+        if standing and self.apart() <= self.manner.tolerance:
             self._ending = Ending.REACHED
         elif now - self._hopeful > self.manner.patience and not self.reading.fallen:
             self._ending = Ending.REACHED if self._near() else Ending.BLOCKED
 
     def _near(self) -> bool:
-        return self._apart() <= 2 * self.manner.tolerance
+        return self.apart() <= 2 * self.manner.tolerance
 
     def _fell(self) -> None:
         self.falls += 1
@@ -355,7 +359,7 @@ class NaoRobot:
             body=self.figures,
         )
 
-    def _apart(self) -> float:
+    def apart(self) -> float:
         """Metres to the goal, by odometry."""
         goal = self.goal.place(self.clock.now() - self._presented)
         return math.dist(self.reading.pose_in_world[:2], goal)
