@@ -10,11 +10,9 @@ from typing import Any
 from monitor.robots.nao_body import LYING, UNKNOWN, LinkLostError, Pose
 from monitor.robots.nao_odometry import Odometry
 from monitor.robots.naoqi_link import Link, RemoteError
+from monitor.robots.naoqi_names import FALLEN, NO_ECHO, SONARS
 from planners.nao import POSTURES
 
-_FALLEN = "robotHasFallen"
-_SONARS = tuple(f"Device/SubDeviceList/US/{side}/Sensor/Value" for side in ("Left", "Right"))
-_NO_ECHO = 5.0  # metres: NAOqi's word for silence
 _BLIND = 1.0  # seconds that the last pose stands for what is none
 
 
@@ -50,7 +48,7 @@ class Looks:
             send("ALMotion", "moveIsActive"),
             send("ALMotion", "robotIsWakeUp"),
             send("ALRobotPosture", "getPosture"),
-            send("ALMemory", "getListData", [_FALLEN, *_SONARS]),
+            send("ALMemory", "getListData", [FALLEN, *SONARS]),
         ]
 
     def look(self, futures: Sequence[Any], now: float) -> Look:
@@ -82,4 +80,4 @@ def _heard(value: Any) -> float:
     """What a sonar told, in metres: inf is no echo, NaN no information."""
     if not isinstance(value, float | int) or not value > 0.0:
         return math.nan
-    return math.inf if value >= _NO_ECHO else float(value)
+    return math.inf if value >= NO_ECHO else float(value)

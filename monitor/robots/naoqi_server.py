@@ -6,129 +6,20 @@ What there is, is listed in docs/nao.md; calling what there is not, fails at the
 from __future__ import annotations
 
 import atexit
+import math
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from typing import Any
 
-from anytime.clocks import Clock
-from monitor.robots.nao_body import Action, NaoBody, Outcome, Reading
-from monitor.robots.nao_clocks import PacedClock, ToldClock
-from monitor.robots.nao_faults import Fault, Faulty
+from anytime.errors import AnytimeError
+from monitor.robots.nao_faults import Fault
 from monitor.robots.nao_scenes import Scene
 from monitor.robots.naoqi_link import libqi
-from monitor.robots.simulated_nao import SimulatedNao
+from monitor.robots.naoqi_names import NO_ECHO, SONARS
+from monitor.robots.naoqi_stage import Stage
 from planners.nao import POSTURES
-
-NO_ECHO = 5.0
-"""Metres that a sonar tells when it hears nothing, in NAOqi."""
-
-FALLEN = "robotHasFallen"
-POSTURE = "PostureChanged"
-FAILED = "ALMotion/MoveFailed"
-SONARS = tuple(f"Device/SubDeviceList/US/{side}/Sensor/Value" for side in ("Left", "Right"))
-_SILENT = 0.2  # seconds that lock-step waits for a command that it was told of
-
-
-class Stage:
-    """The robot behind the services: one lock, one body, the calls that wait for it."""
-
-    def __init__(self, scene: Scene, faults: Iterable[Fault] = (), rate: float | None = 1.0):
-        self.rate = rate  # None is lock-step
-        self.commands = 0  # how many moveTo and goToPosture there were
-        self.begun = False
-        self.listened = False  # whether somebody subscribed to the sonars
-        self.awake = True
-        self.lock = threading.Condition()
-        self.memory: dict[str, Any] = {FALLEN: 0.0, POSTURE: scene.posture, FAILED: []}
-        self.subscribers: dict[str, Any] = {}
-        self.qi = libqi()
-        self._scene, self._faults = scene, tuple(faults)
-        self._waiting: list[tuple[int, str, Action, Any]] = []
-        self.begin(0.0)
-
-    def begin(self, start: float, seed: int | None = None) -> None:
-        """Let the scene start anew at a time, of another seed if one is given."""
-        with self.lock:
-            self.close()
-            scene = self._scene if seed is None else replace(self._scene, seed=seed)
-            self.clock: Clock = ToldClock(start) if self.rate is None else PacedClock(self.rate)
-            self.simulated = SimulatedNao(scene, self.clock)
-            self.body: NaoBody = Faulty(self.simulated, self._faults)
-            self.awake, self.commands = True, 0
-            self.live()
-
-    def command(self, kind: str, begin: Callable[[NaoBody], Action]) -> Any:
-        """Tell the body something; the future of whether it was done."""
-        with self.lock:
-            self.live()
-            self.commands += 1
-            promise = self.qi.Promise()
-            if self.awake:
-                self._waiting.append((self.commands, kind, begin(self.body), promise))
-                self.live()
-            else:  # without stiffness nothing moves, and only a posture notices
-                promise.setValue(kind == "walk")
-            self.lock.notify_all()
-            return promise.future()
-
-    def halt(self, kind: str) -> None:
-        """Break off what is in execution, if it is of that kind."""
-        with self.lock:
-            self.live()
-            if any(waiting == kind for _, waiting, _, _ in self._waiting):
-                self.body.stop()
-                self.live()
-
-    def live(self) -> Reading:
-        """Live up to now: raise what there is to raise, answer the calls that came to their end."""
-        with self.lock:
-            reading = self.body.read()
-            if reading.fallen and not self.memory[FALLEN]:
-                self.awake = False
-            self.remember(FALLEN, float(reading.fallen))
-            self.remember(POSTURE, reading.posture)
-            for waiting in tuple(self._waiting):
-                _, kind, action, promise = waiting
-                if promise.isCancelRequested() and action.poll() is None:
-                    action.cancel()
-                if (outcome := action.poll()) is not None:
-                    self._waiting.remove(waiting)
-                    if (kind, outcome) == ("walk", Outcome.FAILED):
-                        self.remember(FAILED, ["ALMotion", "obstacle", list(reading.pose_in_world)])
-                    promise.setValue(outcome is Outcome.DONE)
-            return reading
-
-    def running(self) -> int:
-        """The number of the command in execution, 0 if there is none."""
-        return max((number for number, _, _, _ in self._waiting), default=0)
-
-    def settle(self, now: float, commands: int) -> tuple[float, int]:
-        """In lock-step: live up to `now`, after so many commands; the robot's time, and `running`.
-
-        Calls of different services may overtake each other, hence the count.
-        """
-        with self.lock:
-            self.lock.wait_for(lambda: self.commands >= commands, _SILENT)
-            if isinstance(self.clock, ToldClock):
-                self.clock.tell(now)
-            return self.live().time, self.running()
-
-    def remember(self, key: str, value: Any) -> None:
-        """Keep a value in the memory, and raise its event if it is another than before."""
-        if self.memory.get(key) != value:
-            self.memory[key] = value
-            if key in self.subscribers:
-                self.subscribers[key].signal(value)
-
-    def close(self) -> None:
-        """Answer all calls that still wait: a promise that is dropped is an error at its caller."""
-        with self.lock:
-            for _, _, _, promise in self._waiting:
-                promise.setValue(False)
-            self._waiting.clear()
 
 
 class Motion:
@@ -203,7 +94,7 @@ class Memory:
 
     def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
         told = self._stage.live().sonars if self._stage.listened else (0.0, 0.0)
-        heard = [NO_ECHO if each == float("inf") else each for each in told]
+        heard = [NO_ECHO if each == math.inf else each for each in told]
         now = self._stage.memory | dict(zip(SONARS, heard, strict=True))
         return [now.get(key) for key in keys]
 
@@ -284,11 +175,17 @@ def serve(
     """Serve a scene until `done` is set; `ready` is called with the url.
 
     rate: how fast time runs; None is lock-step: it stands until `SimClock.settle` tells it.
+    Raises AnytimeError without libqi, or if the port is taken.
     """
     qi = libqi()
     stage = Stage(scene, faults, rate)
     session = qi.Session()
-    session.listenStandalone(f"tcp://127.0.0.1:{port}")
+    try:
+        session.listenStandalone(f"tcp://127.0.0.1:{port}")
+    except RuntimeError:
+        raise AnytimeError(
+            f"nobody can be served at port {port} of 127.0.0.1; give one that is free, or 0"
+        ) from None
     kinds = {"ALMotion": Motion, "ALRobotPosture": Postures, "ALMemory": Memory}
     for name, kind in (kinds | {"ALSonar": Listening, "SimClock": SimClock}).items():
         session.registerService(name, kind(stage))

@@ -9,6 +9,7 @@ import queue
 import signal
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -30,6 +31,8 @@ from monitor.robots.nao_world import Obstacle
 from monitor.robots.naoqi import NaoqiBody
 from monitor.robots.naoqi_actions import Way
 from monitor.robots.naoqi_link import AuthenticatorFactory, password
+from monitor.robots.naoqi_names import FALLEN, SONARS
+from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock
 from monitor.robots.simulated_nao import SimulatedNao
 
 STANDS = Scene(posture="Stand", noise=NOISELESS)
@@ -437,3 +440,15 @@ def test_what_is_no_recording_is_refused_and_a_torn_end_is_not(tmp_path):
     with pytest.raises(AnytimeError, match="ends before"):
         replay.read()
     recorder.close()
+
+
+# Documentation
+
+
+def test_the_page_lists_what_is_served_and_what_can_go_wrong():
+    page = (Path(__file__).parents[2] / "docs" / "nao.md").read_text(encoding="utf-8")
+    for service in (Motion, Postures, Memory, Listening, SimClock):
+        for method in vars(service):
+            assert method.startswith("_") or f"`{method}(" in page, method
+    assert all(f"`{kind}`" in page for kind in KINDS)
+    assert all(name in page for name in (FALLEN, SONARS[0]))
