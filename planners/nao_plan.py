@@ -37,7 +37,6 @@ def plan_world(
     done: int = 0,
     current: Action | None = None,
     elapsed: float = 0.0,
-    goal_velocity: tuple[float, float] = (0.0, 0.0),
     drift: float = 0.0,
     effort: float = 0.005,
     collision: str = "stops",
@@ -48,9 +47,9 @@ def plan_world(
     goal: (x, y) in world, metres. pose: (x, y, heading) in world. obstacles: discs (x, y, radius)
     in world, the robot's own radius included. done: actions of the plan that are complete, which
     `pose` and `posture` contain. current, elapsed: the action that goes on, if any, and the seconds
-    since it began; a plan that goes on with it is spared them. goal_velocity: metres a second.
-    drift: radians by which standing up turns the robot. effort: of a second, in metres of distance. collision: "stops", or "paper"
-    for the paper's rule.
+    since it began; a plan that goes on with it is spared them.
+    drift: radians by which standing up turns the robot. effort: of a second, in metres of distance.
+    collision: "stops", or "paper" for the paper's rule.
     Raises AnytimeError for an unknown posture or rule and for too many obstacles.
     """
     if posture not in POSTURES:
@@ -73,8 +72,6 @@ def plan_world(
         "posture": POSTURES.index(posture),
         "goal_x": goal[0],
         "goal_y": goal[1],
-        "goal_vx": goal_velocity[0],
-        "goal_vy": goal_velocity[1],
         "done": done,
         "current": -1 if current is None else ACTIONS.index(current.name),
         "current_ahead": 0.0 if current is None else current.ahead,
@@ -200,9 +197,8 @@ def going_on(action: int, ahead: float, left: float, w: Any) -> bool:
 
 
 def objective(x: float, y: float, seconds: float, w: Any) -> float:
-    """Metres from where the goal will be then, plus the effort of the seconds. [PRP16] §3."""
-    ex = x - w.goal_x - w.goal_vx * seconds
-    ey = y - w.goal_y - w.goal_vy * seconds
+    """Metres from the goal, plus the effort of the seconds. [PRP16] §3."""
+    ex, ey = x - w.goal_x, y - w.goal_y
     return math.sqrt(ex * ex + ey * ey) + w.effort * seconds
 
 

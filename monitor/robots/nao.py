@@ -17,7 +17,7 @@ from monitor.robots.nao_planning import Errand, new_query
 from monitor.robots.nao_scenes import Goal
 from monitor.states import Situation
 from planners import nao_plan
-from planners.nao import POSTURES, STANDING, Body
+from planners.nao import POSTURES, STAND, STANDING, Body
 from planners.nao_plan import (
     MOST_OBSTACLES,
     actions_of,
@@ -90,6 +90,9 @@ class _Execution:
     def current(self) -> nao_plan.Action | None:
         return self.actions[self.done] if self.done < len(self.actions) else None
 
+
+_DANGER = 0.2  # metres by which a plan is worse that leads into something
+_FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
 
 NOTHING = {("more", 0): False}
 """The plan to do nothing."""
@@ -178,7 +181,9 @@ class NaoRobot:
         value = self.query.value_of(plan.choices)
         if execution is not None:
             self._objective.append((self.clock.now(), value_now))
-            if value >= value_now - self.manner.threshold:
+            # Who begins anew before the feet have moved never moves: then only danger counts.
+            young = self.clock.now() - execution.began < self.figures.step_phase
+            if value >= value_now - (_DANGER if young else self.manner.threshold):
                 return
             self.switches += 1
         elif value >= self.query.value_of(NOTHING) - self.manner.threshold:
@@ -255,13 +260,14 @@ class NaoRobot:
             self._fell()
         elif self._execution is not None:
             self._go_on(self._execution)
-        if self._execution is None and self._ending is None:
-            self._judge(now)
+        met = self.goal.velocity != (0.0, 0.0) and self._near()
+        if (self._execution is None or met) and self._ending is None:
+            self._judge(now, met)
 
-    def _judge(self, now: float) -> None:
-        """Whether it has arrived, or given up."""
+    def _judge(self, now: float, met: bool) -> None:
+        """Whether it has arrived, or given up. A goal that moves need only be met."""
         standing = self.reading.posture in {POSTURES[posture] for posture in STANDING}
-        if standing and self.apart() <= self.manner.tolerance:
+        if standing and (met or self.apart() <= self.manner.tolerance):
             self._ending = Ending.REACHED
         elif now - self._hopeful > self.manner.patience and not self.reading.fallen:
             self._ending = Ending.REACHED if self._near() else Ending.BLOCKED
@@ -347,8 +353,7 @@ class NaoRobot:
         grown = self.figures.radius + margin
         discs = [(x, y, r + grown) for x, y, r in obstacles(heard)[:MOST_OBSTACLES].tolist()]
         return plan_world(
-            self.goal.place(self.clock.now() - self._presented),
-            goal_velocity=self.goal.velocity,
+            self._meeting_point(),
             pose=reading.pose_in_world,
             posture=self._posture,
             obstacles=discs,
@@ -358,6 +363,19 @@ class NaoRobot:
             drift=self.drift.mean,
             body=self.figures,
         )
+
+    def _meeting_point(self) -> tuple[float, float]:
+        """Where the goal will be when the robot can be there."""
+        elapsed = self.clock.now() - self._presented
+        if self.goal.velocity == (0.0, 0.0):
+            return self.goal.place(elapsed)
+        here, body = self.reading.pose_in_world[:2], self.figures
+        rising = float(body.posture_seconds[POSTURES.index(self._posture), STAND])
+        takes = 0.0
+        for _ in range(20):
+            way = math.dist(here, self.goal.place(elapsed + takes))
+            takes = min(_FARTHEST, rising + body.step_phase + way / body.speed)
+        return self.goal.place(elapsed + takes)
 
     def apart(self) -> float:
         """Metres to the goal, by odometry."""

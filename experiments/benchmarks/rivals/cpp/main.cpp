@@ -54,7 +54,6 @@ static World world_of(const Settings& of) {
     w.goal_x = of["goal_x"], w.goal_y = of["goal_y"];
     w.current_ahead = of["current_ahead"], w.current_left = of["current_left"];
     w.command_seconds = of["command_seconds"];
-    w.goal_vx = of["goal_vx"], w.goal_vy = of["goal_vy"];
     w.done = static_cast<std::int64_t>(of["done"]);
     w.current = static_cast<std::int64_t>(of["current"]);
     w.elapsed = of["elapsed"], w.drift = of["drift"], w.effort = of["effort"];

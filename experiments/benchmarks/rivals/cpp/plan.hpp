@@ -11,7 +11,7 @@ enum Posture { STAND_INIT, CROUCH, SIT, SIT_RELAX, STAND, STAND_ZERO };
 struct World {
     double x, y, heading;
     std::int64_t posture;
-    double goal_x, goal_y, goal_vx, goal_vy;
+    double goal_x, goal_y;
     std::int64_t done, current;
     double current_ahead, current_left;
     double elapsed, drift, effort;
@@ -136,7 +136,6 @@ double plan(Rng& rng, const World& w) {
         perform(s, action, ahead, left, goes_on ? w.elapsed : 0.0, w);
         s.seconds += w.command_seconds;
     }
-    const double ex = s.x - w.goal_x - w.goal_vx * s.seconds;
-    const double ey = s.y - w.goal_y - w.goal_vy * s.seconds;
+    const double ex = s.x - w.goal_x, ey = s.y - w.goal_y;
     return std::sqrt(ex * ex + ey * ey) + w.effort * s.seconds;
 }
