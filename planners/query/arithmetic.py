@@ -37,7 +37,33 @@ def _checked(function: Callable[[float], float], overflows: bool) -> Any:
     return checked
 
 
-_TOTAL = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "log", "log10", "log1p", "tanh")
+def _guarded(function: Callable[[float], float], outside: Callable[[float], bool]) -> Any:
+    """The same, where the number alone tells. What is raised before the function is called stands
+    not between two of them: of sin(x) and cos(x) the compiler makes one call."""
+
+    @njit(forceinline=True)
+    def guarded(x: float) -> float:
+        x = float(x)
+        if outside(x):
+            raise ValueError("math domain error")
+        return function(x)
+
+    guarded.__name__ = function.__name__
+    return guarded
+
+
+@njit(forceinline=True)
+def _infinite(x: float) -> bool:
+    return math.isinf(x)
+
+
+@njit(forceinline=True)
+def _negative(x: float) -> bool:
+    return x < 0.0
+
+
+_GUARDED = {"sin": _infinite, "cos": _infinite, "tan": _infinite, "sqrt": _negative}
+_TOTAL = ("asin", "acos", "atan", "log", "log10", "log1p", "tanh")
 _OVERFLOWING = ("exp", "expm1", "sinh", "cosh")
 _EXACT = ("isfinite", "isinf", "isnan")
 
@@ -98,6 +124,7 @@ def _module(name: str, contents: dict[str, Any]) -> ModuleType:
 MODULE = _module(
     "math",
     {
+        **{name: _guarded(getattr(math, name), outside) for name, outside in _GUARDED.items()},
         **{name: _checked(getattr(math, name), False) for name in _TOTAL},
         **{name: _checked(getattr(math, name), True) for name in _OVERFLOWING},
         **{name: getattr(math, name) for name in (*_EXACT, "pi", "e", "tau", "inf", "nan")},

@@ -24,6 +24,7 @@ from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from planners.query.header import (
+    copy_reals,
     header_at,
     load_int,
     load_real,
@@ -59,7 +60,7 @@ _CALMING = 0.1  # of the way back to the usual rate of mutation, each generation
 # --- Randomness: splitmix64 (Steele, Lea & Flood 2014).
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _bits(h: Any) -> Any:
     h.random = h.random + _GOLDEN
     z = h.random
@@ -68,13 +69,13 @@ def _bits(h: Any) -> Any:
     return z ^ (z >> _S31)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _unit(h: Any) -> float:
     """Uniform in [0, 1)."""
     return np.float64(np.int64(_bits(h) >> _S11)) * _UNIT
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _below(h: Any, n: int) -> int:
     """Uniform in [0, n), for n < 2^32."""
     return np.int64(((_bits(h) >> _S32) * _U(n)) >> _S32)
@@ -96,7 +97,7 @@ def _step(h: Any) -> float:
     """A normal step whose size is log-uniform, in units of the spread of what it changes."""
     size = h.largest_step
     if h.smallest_step < size:
-        size *= math.exp(_unit(h) * math.log(h.smallest_step / size))
+        size *= math.exp(_unit(h) * h.steps_range)
     return size * _normal(h)
 
 
@@ -177,7 +178,7 @@ def cell_of(header: int, stream: int, index: int, kind: int) -> int:
     return made
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=False)
 def _overflow(h: Any, reason: int) -> int:
     h.overflow = h.overflow | reason
     if h.length > RUNAWAY:
@@ -187,7 +188,7 @@ def _overflow(h: Any, reason: int) -> int:
     return scrap
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _asked(header: int, h: Any, stream: int, kind: int) -> int:
     """The cell of the next call to a stream, written down in the log."""
     at = h.length
@@ -196,11 +197,19 @@ def _asked(header: int, h: Any, stream: int, kind: int) -> int:
         return _overflow(h, FEW_STREAMS)
     index = np.int64(load_int(h.counts, stream))
     store_int(h.counts, stream, index + 1)
-    cell = np.int64(-1)
-    if index < h.width:
+    if index < h.width and at < h.longest:
         cell = np.int64(load_int(h.cells, stream * h.width + index))
-    if cell < 0:
-        cell = cell_of(header, stream, index, kind)
+        if cell >= 0:
+            store_int(h.log, at, cell)
+            return cell
+    return _asked_anew(header, at, stream, index, kind)
+
+
+@njit(cache=True, forceinline=False)
+def _asked_anew(header: int, at: int, stream: int, index: int, kind: int) -> int:
+    """The same for an address without a cell, and where there is no room."""
+    h = header_at(header)
+    cell = cell_of(header, stream, index, kind)
     if cell < 0:
         return _overflow(h, FEW_CELLS if index < h.width else NARROW)
     if at >= h.longest:
@@ -209,12 +218,15 @@ def _asked(header: int, h: Any, stream: int, kind: int) -> int:
     return cell
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def _due(h: Any, cell: int) -> bool:
     """Whether this inherited value is to be mutated."""
     h.countdown = h.countdown - 1
-    if h.countdown != 0:
-        return False
+    return h.countdown == 0 and _due_now(h, cell)
+
+
+@njit(cache=True, forceinline=False)
+def _due_now(h: Any, cell: int) -> bool:
     h.countdown = 1 + _below(h, 2 * h.gap)
     if h.constrained:
         known = load_real(h.fixed, cell)
@@ -225,56 +237,70 @@ def _due(h: Any, cell: int) -> bool:
 # --- The calls of a model.
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def flip(header: int, stream: int, p: float) -> bool:
     h = header_at(header)
     cell = _asked(header, h, stream, FLIP)
     value = load_real(h.genome, cell)
+    if value == value and not _due(h, cell):
+        return value != 0.0
+    return _flip_anew(header, cell, value, p)
+
+
+@njit(cache=True, forceinline=False)
+def _flip_anew(header: int, cell: int, value: float, p: float) -> bool:
+    h = header_at(header)
     if value != value:
         value = 1.0 if _unit(h) < p else 0.0
-    elif _due(h, cell):
-        value = 1.0 - value
     else:
-        return value != 0.0
+        value = 1.0 - value
     store_real(h.genome, cell, value)
     return value != 0.0
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def randint(header: int, stream: int, n: int) -> int:
     h = header_at(header)
     if n < 1:
         raise ValueError("randint(source, n) was asked with n < 1; n is the number of values")
     cell = _asked(header, h, stream, RANDINT)
     value = load_real(h.genome, cell)
-    if not 0.0 <= value < n:
-        value = np.float64(_below(h, n))
-    elif _due(h, cell):
-        if _unit(h) < 0.5:
-            value = np.float64(_below(h, n))
-        else:
-            near = value + math.floor(_step(h) * n + 0.5)
-            value = near if 0.0 <= near < n else np.float64(_below(h, n))
-    else:
+    if 0.0 <= value < n and not _due(h, cell):
         return np.int64(value)
+    return _randint_anew(header, cell, value, n)
+
+
+@njit(cache=True, forceinline=False)
+def _randint_anew(header: int, cell: int, value: float, n: int) -> int:
+    h = header_at(header)
+    if 0.0 <= value < n and not _unit(h) < 0.5:
+        near = value + math.floor(_step(h) * n + 0.5)
+        value = near if 0.0 <= near < n else np.float64(_below(h, n))
+    else:
+        value = np.float64(_below(h, n))
     store_real(h.genome, cell, value)
     return np.int64(value)
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
 def gaussian(header: int, stream: int, mean: float, sigma: float) -> float:
     h = header_at(header)
     cell = _asked(header, h, stream, GAUSSIAN)
     value = load_real(h.genome, cell)
-    if value != value:
-        value = mean + sigma * _normal(h)
-    elif _due(h, cell):
-        if _unit(h) < _REDRAW:
-            value = mean + sigma * _normal(h)
-        else:
-            value += sigma * _step(h)
-    else:
+    if value == value and not _due(h, cell):
         return value
+    return _gaussian_anew(header, stream, cell, value, mean, sigma)
+
+
+@njit(cache=True, forceinline=False)
+def _gaussian_anew(
+    header: int, stream: int, cell: int, value: float, mean: float, sigma: float
+) -> float:
+    h = header_at(header)
+    if value != value or _unit(h) < _REDRAW:
+        value = mean + sigma * _normal(h)
+    else:
+        value += sigma * _step(h)
     store_real(h.scales, max(0, stream), sigma)
     store_real(h.genome, cell, value)
     return value
@@ -366,190 +392,238 @@ def lognormal(header: int, stream: int, mean: float, sigma: float) -> float:
     return value
 
 
-# --- Making a generation.
+# --- Making a generation. Genomes and logs go by their addresses: nothing is faster to pass on.
 
 
-@njit(cache=True)
-def _better(h: Any, values: np.ndarray, first: int, size: int) -> int:
-    """A parent: the better of two."""
-    bits = _bits(h)
-    one = first + np.int64(((bits >> _S32) * _U(size)) >> _S32)
-    two = first + np.int64(((bits & _U(0xFFFFFFFF)) * _U(size)) >> _S32)
-    return one if values[one] <= values[two] else two
+@njit(cache=True, forceinline=True)
+def _stream(h: Any, cell: int) -> int:
+    return np.int64(load_int(h.homes, 3 * cell))
 
 
-@njit(cache=True)
-def _mix(h: Any, child: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
-    """Each value from one parent or the other; what only one of them has is inherited."""
-    bits = _U(0)
-    for cell in range(len(child)):
-        if cell & 63 == 0:
-            bits = _bits(h)
-        one, two = (a[cell], b[cell]) if bits & _ONE else (b[cell], a[cell])
-        bits >>= _ONE
-        child[cell] = one if one == one else two
+@njit(cache=True, forceinline=True)
+def _index(h: Any, cell: int) -> int:
+    return np.int64(load_int(h.homes, 3 * cell + 1))
 
 
-@njit(cache=True)
+@njit(cache=True, forceinline=True)
+def _kind(h: Any, cell: int) -> int:
+    return np.int64(load_int(h.homes, 3 * cell + 2))
+
+
+@njit(cache=True, forceinline=True)
 def _continuous(kind: int) -> bool:
     return kind in (GAUSSIAN, UNIFORM, EXPONENTIAL, LOGNORMAL)
 
 
+@njit(cache=True, forceinline=True)
+def _at(log: int, place: int) -> int:
+    return np.int64(load_int(log, place))
+
+
+@njit(cache=True, forceinline=True)
+def _parent(h: Any, row: int) -> int:
+    """The genome of a parent."""
+    return h.genomes + 8 * (h.side * (h.size + 1) + row) * h.most_cells
+
+
+@njit(cache=True, forceinline=False)
+def _better(h: Any, first: int, size: int) -> int:
+    """A parent: the better of two."""
+    values = h.values + 8 * h.side * (h.size + 1)
+    bits = _bits(h)
+    one = first + np.int64(((bits >> _S32) * _U(size)) >> _S32)
+    two = first + np.int64(((bits & _U(0xFFFFFFFF)) * _U(size)) >> _S32)
+    return one if load_real(values, one) <= load_real(values, two) else two
+
+
 @njit(cache=True)
-def _blend(h: Any, child: Any, a: Any, b: Any, c: Any, share: float, log: Any, length: int) -> None:
+def _mix(h: Any, child: int, a: int, b: int, known: int) -> None:
+    """Each value from one parent or the other; what only one of them has is inherited.
+
+    Without branches, 64 values by one word of random bits: the compiler makes vectors of it.
+    """
+    for begin in range(0, known, 64):
+        bits = _bits(h)
+        for i in range(min(64, known - begin)):
+            x, y = load_real(a, begin + i), load_real(b, begin + i)
+            from_a = (bits >> _U(i)) & _ONE != 0
+            one, two = x if from_a else y, y if from_a else x
+            store_real(child, begin + i, one if one == one else two)
+
+
+@njit(cache=True)
+def _blend(h: Any, child: int, a: int, b: int, c: int, share: float, log: int, length: int) -> None:
     """a + share (b - c), in the continuous choices that a made and all three have."""
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
-    child[:] = a
+    copy_reals(child, a, h.known_cells)
     for at in range(length):
-        cell = log[at]
-        if _continuous(homes[cell, 2]):
-            value = a[cell] + share * (b[cell] - c[cell])
+        cell = _at(log, at)
+        if _continuous(_kind(h, cell)):
+            value = load_real(a, cell) + share * (load_real(b, cell) - load_real(c, cell))
             if value == value:
-                child[cell] = value
+                store_real(child, cell, value)
 
 
 @njit(cache=True)
-def _shift(h: Any, child: np.ndarray, log: np.ndarray, length: int) -> bool:
+def _shift(h: Any, child: int, log: int, length: int) -> bool:
     """Move a bit of one value of a source to another of its values: their sum stays.
 
     What adds up to a goal can only be straightened that way.
     """
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
     at = _below(h, length)
     for _ in range(length):
-        kind = homes[log[at], 2]
+        kind = _kind(h, _at(log, at))
         if kind in (GAUSSIAN, UNIFORM):
             break
         at = at + 1 if at + 1 < length else 0
     else:
         return False
-    one = log[at]
-    stream = homes[one, 0]
+    one = _at(log, at)
+    stream = _stream(h, one)
     other = _below(h, length)
     for _ in range(length):
-        if homes[log[other], 0] == stream and log[other] != one:
+        if _stream(h, _at(log, other)) == stream and _at(log, other) != one:
             break
         other = other + 1 if other + 1 < length else 0
     else:
         return False
-    two = log[other]
+    two = _at(log, other)
     if _unit(h) < _CANCEL:
-        moved = -child[one]
+        moved = -load_real(child, one)
     else:
-        moved = load_real(h.scales, np.int64(stream)) * _step(h)
-    child[one] += moved
-    child[two] -= moved
+        moved = load_real(h.scales, stream) * _step(h)
+    store_real(child, one, load_real(child, one) + moved)
+    store_real(child, two, load_real(child, two) - moved)
     return True
 
 
 @njit(cache=True)
-def _edit(header: int, child: np.ndarray, log: np.ndarray, length: int) -> None:
+def _edit(header: int, child: int, log: int, length: int, known: int) -> None:
     """Delete, repeat, insert, split or merge one turn of the model's loop.
 
     A turn is what was chosen between two successive calls to one stream, found in the order of the
     calls. What is split or merged keeps the sum of its normal variables.
     """
     h = header_at(header)
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
-    stream = homes[log[0], 0] if _unit(h) < 0.5 else homes[log[_below(h, length)], 0]
+    stream = _stream(h, _at(log, 0 if _unit(h) < 0.5 else _below(h, length)))
     begin = _below(h, length)
     for _ in range(length):
-        if homes[log[begin], 0] == stream:
+        if _stream(h, _at(log, begin)) == stream:
             break
         begin = begin + 1 if begin + 1 < length else 0
-    end = _turn_end(homes, log, length, begin)
+    end = _turn_end(h, log, length, begin)
     if end == length:
         return
     edit = _below(h, 5)
     if edit == 0:
         _delete(h, child, log, length, begin, end)
     elif edit == 4:
-        over = _turn_end(homes, log, length, end)
-        if over == length or over - end != end - begin:
+        over = _turn_end(h, log, length, end)
+        turn = end - begin
+        if over == length or over - end != turn:
             return
         for at in range(begin, end):
-            if homes[log[at], 0] != homes[log[at + end - begin], 0]:
+            if _stream(h, _at(log, at)) != _stream(h, _at(log, at + turn)):
                 return
         for at in range(begin, end):
-            if homes[log[at], 2] == GAUSSIAN:
-                child[log[at]] += child[log[at + end - begin]]
+            cell = _at(log, at)
+            if _kind(h, cell) == GAUSSIAN:
+                value = load_real(child, cell) + load_real(child, _at(log, at + turn))
+                store_real(child, cell, value)
         _delete(h, child, log, length, end, over)
     else:
         share = _unit(h)
-        _repeat(header, child, log, length, begin, end, edit, share)
+        _repeat(header, child, log, length, begin, end, edit, share, known)
 
 
 @njit(cache=True)
-def _turn_end(homes: np.ndarray, log: np.ndarray, length: int, begin: int) -> int:
+def _turn_end(h: Any, log: int, length: int, begin: int) -> int:
     """Where the next turn begins, or `length`."""
+    stream = _stream(h, _at(log, begin))
     end = begin + 1
-    while end < length and homes[log[end], 0] != homes[log[begin], 0]:
+    while end < length and _stream(h, _at(log, end)) != stream:
         end += 1
     return end
 
 
+@njit(cache=True, forceinline=True)
+def _count(h: Any, log: int, begin: int, end: int) -> None:
+    """Count the calls of a turn, by stream."""
+    for at in range(begin, end):
+        stream = _stream(h, _at(log, at))
+        store_int(h.counts, stream, load_int(h.counts, stream) + 1)
+
+
+@njit(cache=True, forceinline=True)
+def _uncount(h: Any, log: int, begin: int, end: int) -> None:
+    for at in range(begin, end):
+        store_int(h.counts, _stream(h, _at(log, at)), 0)
+
+
 @njit(cache=True)
-def _delete(h: Any, child: Any, log: Any, length: int, begin: int, end: int) -> None:
+def _delete(h: Any, child: int, log: int, length: int, begin: int, end: int) -> None:
     """Move what comes after a turn to where the turn was, source by source."""
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
-    counts = carray(pointer(h.counts), h.most_streams, np.int32)
-    for at in range(begin, end):
-        counts[homes[log[at], 0]] += 1
+    _count(h, log, begin, end)
     for at in range(end, length):
-        source = log[at]
-        moved = counts[homes[source, 0]]
+        source = _at(log, at)
+        stream = _stream(h, source)
+        moved = np.int64(load_int(h.counts, stream))
         if moved:
-            child[load_int(h.cells, homes[source, 0] * h.width + homes[source, 1] - moved)] = child[
-                source
-            ]
-    for at in range(begin, end):
-        counts[homes[log[at], 0]] = 0
+            target = load_int(h.cells, stream * h.width + _index(h, source) - moved)
+            store_real(child, np.int64(target), load_real(child, source))
+    _uncount(h, log, begin, end)
 
 
 @njit(cache=True)
 def _repeat(
-    header: int, child: Any, log: Any, length: int, begin: int, end: int, edit: int, share: float
+    header: int,
+    child: int,
+    log: int,
+    length: int,
+    begin: int,
+    end: int,
+    edit: int,
+    share: float,
+    known: int,
 ) -> None:
     """Make room after a turn: for a copy (edit 1), a new one (2) or a share of it (3)."""
     h = header_at(header)
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
-    counts = carray(pointer(h.counts), h.most_streams, np.int32)
-    for at in range(begin, end):
-        counts[homes[log[at], 0]] += 1
+    _count(h, log, begin, end)
     for at in range(length - 1, begin - 1, -1):
-        source = log[at]
-        of = np.int64(homes[source, 0])
-        moved = counts[of]
+        source = _at(log, at)
+        stream = _stream(h, source)
+        moved = np.int64(load_int(h.counts, stream))
         if moved:
-            target = cell_of(header, of, np.int64(homes[source, 1]) + moved, homes[source, 2])
-            if 0 <= target < len(child):
-                child[target] = child[source]
+            kind, index = _kind(h, source), _index(h, source) + moved
+            target = np.int64(-1)
+            if index < h.width:
+                target = np.int64(load_int(h.cells, stream * h.width + index))
+                if target < 0:
+                    target = cell_of(header, stream, index, kind)
+            if 0 <= target < known:
+                value = load_real(child, source)
+                moved_value = value
                 if at < end and edit == 2 and at > begin:
-                    child[target] = np.nan
-                elif at < end and edit == 3 and homes[source, 2] == GAUSSIAN:
-                    child[target] = (1.0 - share) * child[source]
-                    child[source] *= share
-    for at in range(begin, end):
-        counts[homes[log[at], 0]] = 0
+                    moved_value = np.nan
+                elif at < end and edit == 3 and kind == GAUSSIAN:
+                    moved_value = (1.0 - share) * value
+                    store_real(child, source, value * share)
+                store_real(child, target, moved_value)
+    _uncount(h, log, begin, end)
 
 
 @njit(cache=True)
-def _cloud(
-    h: Any, child: np.ndarray, a: np.ndarray, log: np.ndarray, length: int, step: float
-) -> int:
+def _cloud(h: Any, child: int, a: int, log: int, length: int, step: float) -> int:
     """Move all continuous choices of an individual a little; how many there are."""
-    homes = carray(pointer(h.homes), (h.most_cells, 3), np.int32)
-    child[:] = a
+    copy_reals(child, a, h.known_cells)
     moved = 0
     for at in range(length):
-        cell = log[at]
-        kind = homes[cell, 2]
+        cell = _at(log, at)
+        kind = _kind(h, cell)
         if _continuous(kind):
-            scale = load_real(h.scales, np.int64(homes[cell, 0]))
-            if kind == LOGNORMAL:
-                child[cell] *= math.exp(scale * step * _normal(h))
-            else:
-                child[cell] += scale * step * _normal(h)
+            spread = load_real(h.scales, _stream(h, cell)) * step * _normal(h)
+            value = load_real(child, cell)
+            value = value * math.exp(spread) if kind == LOGNORMAL else value + spread
+            store_real(child, cell, value)
             moved += 1
     return moved
 
@@ -589,50 +663,41 @@ def breed(header: int, row: int) -> None:
     """Prepare the genome of an individual of the next generation, and the tables for its run."""
     prepare(header, row)
     h = header_at(header)
-    rows, cells = h.size + 1, h.most_cells
-    young = 1 - h.side
-    genomes = carray(pointer(h.genomes), (2, rows, cells), np.float64)
-    logs = carray(pointer(h.logs), (2, rows, h.longest), np.int32)
-    lengths = carray(pointer(h.lengths), (2, rows), np.int32)
-    values = carray(pointer(h.values), (2, rows), np.float64)
-    elites = carray(pointer(h.elites), h.size, np.int32)
-    known = h.known_cells
-    child = genomes[young, row, :known]
-
+    child, known = h.genome, h.known_cells
     island = _island(h, row)
     first, size, kept = _extent(h, island)
     begins = h.generation == 0 or load_int(h.begins, island) != 0
     if begins or (row - first >= kept and _unit(h) < h.immigrants):
-        child[:] = np.nan
+        for cell in range(known):
+            store_real(child, cell, np.nan)
     elif row - first < kept:
-        child[:] = genomes[h.side, elites[row], :known]
+        copy_reals(child, _parent(h, np.int64(load_int(h.elites, row))), known)
     else:
         chosen = _unit(h)
         clouded = chosen < h.cloud
-        a = np.int64(elites[first]) if clouded else _better(h, values[h.side], first, size)
-        length = np.int64(lengths[h.side, a])
-        log = logs[h.side, a]
-        parent = genomes[h.side, a, :known]
+        a = np.int64(load_int(h.elites, first)) if clouded else _better(h, first, size)
+        at = h.side * (h.size + 1) + a
+        length = np.int64(load_int(h.lengths, at))
+        log = h.logs + 4 * at * h.longest
+        parent = _parent(h, a)
         chosen -= h.cloud
         if clouded:
             h.clouded = _cloud(h, child, parent, log, length, load_real(h.steps, island))
         elif chosen < h.crossover:
-            b = _better(h, values[h.side], first, size)
-            _mix(h, child, parent, genomes[h.side, b, :known])
+            _mix(h, child, parent, _parent(h, _better(h, first, size)), known)
         elif chosen < h.crossover + h.line:
-            b = _better(h, values[h.side], first, size)
-            other = genomes[h.side, b, :known]
+            other = _parent(h, _better(h, first, size))
             _blend(h, child, parent, other, parent, 1.5 * _unit(h) - 0.25, log, length)
         elif chosen < h.crossover + h.line + h.difference:
-            b = genomes[h.side, first + _below(h, size), :known]
-            c = genomes[h.side, first + _below(h, size), :known]
+            b = _parent(h, first + _below(h, size))
+            c = _parent(h, first + _below(h, size))
             _blend(h, child, parent, b, c, _unit(h), log, length)
         else:
-            child[:] = parent
+            copy_reals(child, parent, known)
         if length > 0 and not clouded:
             shifted = _unit(h) < h.pair and _shift(h, child, log, length)
             if _unit(h) < h.structure:
-                _edit(header, child, log, length)
+                _edit(header, child, log, length, known)
             if not shifted:
                 hurry = 1.0 if h.adaptive == 0 else 1.0 + 2.0 * (1.0 - h.calm)
                 h.gap = max(1, np.int64(length / (h.mutations * hurry)))
@@ -641,7 +706,7 @@ def breed(header: int, row: int) -> None:
         for cell in range(known):
             fixed = load_real(h.fixed, cell)
             if fixed == fixed:
-                child[cell] = fixed
+                store_real(child, cell, fixed)
 
 
 @njit(cache=True)

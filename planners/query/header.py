@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import from_dtype, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 HEADER = np.dtype(
@@ -77,6 +78,7 @@ HEADER = np.dtype(
         ("mutations", "f8"),
         ("smallest_step", "f8"),
         ("largest_step", "f8"),
+        ("steps_range", "f8"),  # log(smallest_step / largest_step)
         ("exclusion", "f8"),
         ("restart", "i8"),
         ("adaptive", "i8"),
@@ -139,3 +141,16 @@ def _accessors(element: Any, width: Any) -> tuple[Any, Any]:
 
 load_real, store_real = _accessors(types.float64, ir.DoubleType())
 load_int, store_int = _accessors(types.int32, ir.IntType(32))
+
+
+@intrinsic
+def copy_reals(typingctx: Any, target: Any, source: Any, count: Any) -> Any:
+    """Copy float64 numbers from one address to another; they do not overlap."""
+    signature = types.void(types.int64, types.int64, types.int64)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        to, of = (builder.inttoptr(place, ir.DoubleType().as_pointer()) for place in args[:2])
+        cgutils.raw_memcpy(builder, to, of, args[2], 8, align=8)
+        return context.get_dummy_value()
+
+    return signature, codegen

@@ -32,16 +32,13 @@ class Memory:
 
     def __init__(self, size: int, streams: int, islands: int = 1) -> None:
         self._record = np.zeros(1, HEADER)
+        self.address: int = self._record.ctypes.data
         self.blocks: dict[str, np.ndarray] = {}
         self["size"] = self["main"] = size
         self["islands"] = islands
         self["most_streams"] = max(16, 2 * streams)
         self["most_cells"], self["width"], self["longest"] = 128, 32, 64
         self._allocate()
-
-    @property
-    def address(self) -> int:
-        return self._record.ctypes.data
 
     def __getitem__(self, field: str) -> Any:
         return self._record[field][0].item()

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -106,6 +107,9 @@ def _stream_here(rng, number):
     return lambda rng, number: genetics.stream_of(_address(rng), _path(rng), number, -1)
 
 
+_INLINED = {"forceinline": True}
+
+
 def _number(rng, source):
     """The number of a source or path name, which must be known when the model is made native."""
     if not isinstance(source, types.StringLiteral):
@@ -126,8 +130,8 @@ def _at(rng, name, place=0):
     return at
 
 
-@overload_method(RngType, "flip", prefer_literal=True)
-@overload_method(PathType, "flip", prefer_literal=True)
+@overload_method(RngType, "flip", prefer_literal=True, jit_options=_INLINED)
+@overload_method(PathType, "flip", prefer_literal=True, jit_options=_INLINED)
 def _flip(rng, source, p=0.5):
     number = _number(rng, source)
     return lambda rng, source, p=0.5: genetics.flip(
@@ -135,8 +139,8 @@ def _flip(rng, source, p=0.5):
     )
 
 
-@overload_method(RngType, "randint", prefer_literal=True)
-@overload_method(PathType, "randint", prefer_literal=True)
+@overload_method(RngType, "randint", prefer_literal=True, jit_options=_INLINED)
+@overload_method(PathType, "randint", prefer_literal=True, jit_options=_INLINED)
 def _randint(rng, source, n):
     number = _number(rng, source)
     if not isinstance(n, types.Integer | types.IntegerLiteral):
@@ -144,8 +148,8 @@ def _randint(rng, source, n):
     return lambda rng, source, n: genetics.randint(_address(rng), _stream(rng, number), np.int64(n))
 
 
-@overload_method(RngType, "gaussian", prefer_literal=True)
-@overload_method(PathType, "gaussian", prefer_literal=True)
+@overload_method(RngType, "gaussian", prefer_literal=True, jit_options=_INLINED)
+@overload_method(PathType, "gaussian", prefer_literal=True, jit_options=_INLINED)
 def _gaussian(rng, source, mean=0.0, sigma=1.0):
     number = _number(rng, source)
     return lambda rng, source, mean=0.0, sigma=1.0: genetics.gaussian(
@@ -214,13 +218,15 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
     mark = _mark(text)
     rng = RngType(text.names, mark)
     built: dict[int, Any] = {}
+    places = _places(text)
     for function in text.functions:
         made = _built(function, built)
         last = function is text.functions[-1]
+        inlined = places[id(function.original)] == 1
         try:
-            built[id(function.original)] = njit(made, cache=last)
+            built[id(function.original)] = njit(made, cache=last, forceinline=inlined)
         except RuntimeError:  # nowhere to keep the code: the model is no file's
-            built[id(function.original)] = njit(made)
+            built[id(function.original)] = njit(made, forceinline=inlined)
     dispatcher = built[id(text.functions[-1].original)]
     try:
         dispatcher.compile(types.float64(rng, *[from_dtype(world)] * takes_world))
@@ -229,6 +235,18 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
     compiled = next(iter(dispatcher.overloads.values()))
     address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return Native(address, bool(dispatcher.stats.cache_hits), dispatcher)
+
+
+def _places(text: Text) -> Counter[int]:
+    """From how many places each function is called. What is called from one is compiled into it."""
+    return Counter(
+        id(function.calls[node.func.id])
+        for function in text.functions
+        for node in ast.walk(function.tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in function.calls
+    )
 
 
 def _built(function: Function, built: dict[int, Any]) -> FunctionType:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -23,8 +24,10 @@ from planners.query.plain import Rng, Sources
 from planners.query.reading import Text
 from planners.query.worlds import World
 
-CHUNK = 4
-"""Generations between two looks at the world and at who waits."""
+TURN = 5e-4
+"""Seconds between two looks at the world and at who waits, if no generation takes longer."""
+
+_MOST = 64  # generations of a turn, however short they are
 
 _LONGEST = 8192  # choices: a longer run is invalid, and the tables do not grow for it
 
@@ -66,6 +69,7 @@ class Query:
             self._sources.expect(text)
         self._turns = Turns()
         self._best: Solution | None = None
+        self._chunk = 1  # generations of a turn
 
     @property
     def evaluations(self) -> int:
@@ -111,7 +115,10 @@ class Query:
         while made < generations:
             with self._turns.take():
                 self.world.take_over()
-                done = self._evolve(min(CHUNK, generations - made), until)
+                begun = time.perf_counter()
+                done = self._evolve(min(self._chunk, generations - made), until)
+                each = (time.perf_counter() - begun) / done
+                self._chunk = max(1, min(_MOST, int(TURN / each))) if each > 0 else _MOST
                 self._best = None
                 made += done
                 if self.value <= until:
@@ -159,7 +166,7 @@ class Query:
         deadline = Deadline.after(seconds)
         last = self.evaluations + evaluations
         while not deadline.expired() and (left := last - self.evaluations) >= self.size:
-            self.step(int(min(CHUNK, left // self.size)), until)
+            self.step(int(min(self._chunk, left // self.size)), until)
             if self.value <= until:
                 break
         return self.best
@@ -317,7 +324,7 @@ class _Worker(threading.Thread):
     def run(self) -> None:
         try:
             while not self._over.is_set():
-                self._query.step()
+                self._query.step(self._query._chunk)
         except BaseException as error:
             self._error = error
 
@@ -365,6 +372,7 @@ def _memory(population: int, seed: int, operators: Operators) -> Memory:
         memory[name] = getattr(operators, name)
     memory["mutations"], memory["exclusion"] = operators.mutations, operators.exclusion
     memory["smallest_step"], memory["largest_step"] = operators.steps
+    memory["steps_range"] = math.log(operators.steps[0] / operators.steps[1])
     memory["restart"] = operators.restart
     memory["adaptive"], memory["dormant"] = int(operators.adaptive), int(operators.dormant)
     return memory

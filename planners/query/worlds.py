@@ -27,6 +27,7 @@ class World(MutableMapping[str, Any]):
         self._names = tuple(arrays)
         self._written = np.zeros(1, self.layout)
         self._read = np.zeros(1, self.layout)
+        self.address: int = self._read.ctypes.data  # where the native model reads
         self._lock = threading.Lock()
         self._fresh = True
         self._plain: Any = None
@@ -66,11 +67,6 @@ class World(MutableMapping[str, Any]):
                 self._read[:] = self._written
                 self._fresh = False
                 self._plain = None
-
-    @property
-    def address(self) -> int:
-        """Where the native model reads."""
-        return self._read.ctypes.data
 
     @property
     def plain(self) -> Any:
