@@ -31,7 +31,7 @@ from monitor.robots.nao_world import Obstacle
 from monitor.robots.naoqi import NaoqiBody
 from monitor.robots.naoqi_actions import Way
 from monitor.robots.naoqi_link import AuthenticatorFactory, password
-from monitor.robots.naoqi_names import FALLEN, SONARS
+from monitor.robots.naoqi_names import FALLEN, NO_ECHO, SONARS
 from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock
 from monitor.robots.simulated_nao import SimulatedNao
 
@@ -177,6 +177,12 @@ def test_the_server_offers_what_is_documented_and_nothing_else(rig):
         assert all(map(math.isnan, nao.read().sonars)), "without a subscriber they tell nothing"
 
 
+def test_silence_is_told_as_naoqi_tells_it(rig):
+    with contextlib.closing(NaoqiBody(rig.live().url)) as nao:
+        assert nao.link.call("ALMemory", "getListData", list(SONARS)) == [NO_ECHO, NO_ECHO]
+        assert nao.read().sonars == (math.inf, math.inf)
+
+
 def test_events_are_raised_for_who_subscribed(rig):
     told: queue.Queue[float] = queue.Queue()
     with contextlib.closing(NaoqiBody(rig.faulty().url, seed=0, timeout=5.0)) as nao:
@@ -199,6 +205,19 @@ def test_a_long_walk_in_pieces_goes_where_it_should_and_does_not_pause(rig):
         assert turn == pytest.approx(1.0, abs=0.3)
         # five pauses to stop and start would be 6 s more
         assert nao.now() - begun < math.hypot(1.0, 0.3) / 0.095 + 6.0
+
+
+def test_who_thinks_too_long_finds_the_robot_standing_and_walks_on(rig):
+    with contextlib.closing(NaoqiBody(rig.live().url, segment=0.2)) as nao:
+        before = nao.read().pose_in_world
+        action = nao.walk(0.5, 0.0, 0.0)
+        while nao.read().pose_in_world == before:
+            nao.clock.advance(0.2)
+        while nao.read().moving:
+            nao.clock.advance(0.5)
+        assert math.dist(nao.read().pose_in_world[:2], before[:2]) == pytest.approx(0.2, abs=0.08)
+        assert ended(nao, action) is Outcome.DONE
+        assert math.dist(nao.read().pose_in_world[:2], before[:2]) == pytest.approx(0.5, abs=0.08)
 
 
 # Failures
