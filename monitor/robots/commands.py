@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "run", run, "live a monitored mission and write its page")
-    parser.add_argument("mission", type=Path, metavar="MISSION.toml")
+    parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="or a NAO's SCENE.toml")
     parser.add_argument("--map", type=Path, metavar="FILE", help="another floor (.map or .yaml)")
     parser.add_argument("--start", type=_cell, metavar="ROW,COLUMN", help="row 0 is the top")
     parser.add_argument("--goal", type=_cell, metavar="ROW,COLUMN")
     parser.add_argument("--scenario", type=natural, metavar="N", help="the N-th of FILE.scen")
     parser.add_argument("--seed", type=natural, default=0, help="of the mission (default 0)")
     parser.add_argument("--policy", default="expected", help="expected, paper, fixed, min or max")
+    parser.add_argument(
+        "--robot", default="simulated", metavar="WHERE", help="a NAO: simulated or naoqi:tcp://…"
+    )
     parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
     parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
     parser.add_argument(
@@ -57,7 +60,12 @@ def run(options: argparse.Namespace) -> Answer:
     from monitor.page import write_page
     from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.grid_missions import read_mission
+    from monitor.robots.nao_scenes import is_scene
 
+    if is_scene(options.mission):
+        return _run_nao(options)
+    if options.robot != "simulated":
+        raise AnytimeError(f"--robot {options.robot} is for a NAO's scene, not for a grid mission")
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
     start, goal = options.start, options.goal
@@ -83,6 +91,46 @@ def run(options: argparse.Namespace) -> Answer:
             "energy": report.energy,
             "frames": len(report.frames),
             "ledger": report.ledger,
+            "log": str(log),
+            "page": str(page),
+        },
+        0 if report else 1,
+    )
+
+
+def _run_nao(options: argparse.Namespace) -> Answer:
+    """Live a NAO's scene, on the simulated body or at an address."""
+    from anytime import WallClock
+    from monitor.logs import read_log
+    from monitor.page import write_page
+    from monitor.robots.nao_addresses import nao_body
+    from monitor.robots.nao_missions import brief
+    from monitor.robots.nao_scenes import read_scene
+
+    scene = read_scene(options.mission, seed=options.seed)
+    with progress("measuring listening and planning"):
+        briefing = brief()
+    here = options.robot == "simulated" and options.clock == "work"
+    clock = None if here else WallClock()
+    body = None if here else nao_body(options.robot, scene, clock)
+    robot = briefing.robot(scene, body=body, clock=clock)
+    log = options.log / "mission.jsonl"
+    report = briefing.log(robot, scene, log)
+    robot.body.close()
+    page = write_page([read_log(log)], options.log / "mission.html")
+    told = (
+        f"{robot.apart():.3f} m from the goal by odometry, {robot.plans} plans, {robot.falls} falls"
+    )
+    return Answer(
+        f"{report!r}\n{told}\nlog {log}, page {page}",
+        {
+            "ending": report.ending.value,
+            "net": report.net,
+            "seconds": report.seconds,
+            "frames": len(report.frames),
+            "final_error_m": robot.apart(),
+            "plans": robot.plans,
+            "falls": robot.falls,
             "log": str(log),
             "page": str(page),
         },

@@ -235,8 +235,8 @@ class NaoRobot:
         }
 
     def picture(self) -> Mapping[str, Any]:
-        """What was heard: probabilities of being blocked [rows, columns]."""
-        return {"belief": self.hearing.known.probabilities()}
+        """What was heard."""
+        return {"belief": self.hearing.known}
 
     # --- Execution.
 

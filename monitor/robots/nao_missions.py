@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -12,12 +13,14 @@ import compiler
 from anytime import Machine, WorkClock, measure
 from anytime.clocks import Clock
 from compiler import CompiledProgram
+from monitor.logs import LogWriter
 from monitor.missions import Energy, Mission, Value
 from monitor.monitoring import Monitor
 from monitor.policies import constant
 from monitor.reports import Frame, Report
 from monitor.robots.nao import Drift, Manner, NaoRobot
 from monitor.robots.nao_body import NaoBody
+from monitor.robots.nao_floor import plan_of
 from monitor.robots.nao_planning import errands, improve
 from monitor.robots.nao_scenes import Scene
 from monitor.robots.simulated_nao import SimulatedNao
@@ -79,6 +82,22 @@ class NaoBriefing:
     ) -> Report:
         """Live a mission to its ending."""
         return self.monitor.run(self.mission, robot, seed=seed, listen=listen)
+
+    def log(self, robot: NaoRobot, scene: Scene, path: Path) -> Report:
+        """Live a mission in a scene, and write its log while it goes on."""
+        drawn = plan_of(scene)
+        with LogWriter(path) as writer:
+            writer.mission(
+                self.mission,
+                policy=self.monitor.name,
+                seed=scene.seed,
+                labels=self.program.labels,
+                machine=self.program.machine,
+                floor=drawn.floor,
+            )
+            report = self.live(robot, scene.seed, lambda frame: writer.frame(drawn.drawn(frame)))
+            writer.end(report)
+        return report
 
     def unmonitored(self) -> NaoBriefing:
         """The same, but the first good plan is executed to its end, come what may."""

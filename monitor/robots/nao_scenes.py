@@ -150,6 +150,15 @@ def read_scene(path: Path, *, seed: int | None = None, noise: bool = True) -> Sc
     return scene if noise else scene.noiseless()
 
 
+def is_scene(path: Path) -> bool:
+    """Whether a TOML file is about a NAO rather than a grid mission: it has a goal in metres."""
+    try:
+        goal = tomllib.loads(path.read_text(encoding="utf-8")).get("goal")
+    except (OSError, ValueError):  # whoever reads it in earnest says what is wrong
+        return False
+    return isinstance(goal, dict) and "at" in goal
+
+
 def _parse(path: Path) -> _File:
     try:
         content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
