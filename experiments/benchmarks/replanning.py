@@ -164,7 +164,13 @@ def appeared(seed: int, operators: Operators | None = None) -> Recovery:
     poses = trajectory(actions, dict(searched.world))
     done = max(i for i, pose in enumerate(poses) if pose.seconds <= 5.0)
     here = poses[done]
-    start, disc = (here.x + 0.1 * (5.0 - here.seconds), here.y), (0.6, 0.0, 0.2)
+    start = (here.x, here.y)
+    if done < len(actions):
+        after = poses[done + 1]
+        share = (5.0 - here.seconds) / (after.seconds - here.seconds)
+        start = (here.x + share * (after.x - here.x), here.y + share * (after.y - here.y))
+    ahead = 0.4 / math.dist(start, GOAL)
+    disc = (start[0] + ahead * (GOAL[0] - start[0]), start[1] + ahead * (GOAL[1] - start[1]), 0.2)
     current = actions[done] if done < len(actions) else None
     searched.constrain(made_before(choices, done))
     now = plan_world(
