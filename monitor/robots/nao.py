@@ -92,6 +92,8 @@ class _Execution:
 
 
 _DANGER = 0.2  # metres by which a plan is worse that leads into something
+_TOUCHED_RADIUS = 0.1  # metres, of something that it fell over
+_TOUCHED_FOR = 45.0  # seconds for which that is believed to be there
 _FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
 
 NOTHING = {("more", 0): False}
@@ -131,6 +133,7 @@ class NaoRobot:
         self._hopeful = self._since  # when a plan last brought it nearer
         self._execution: _Execution | None = None
         self._posture = "Crouch"  # the last one that had a name
+        self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
         self.hearing = Hearing(self, sonars or Sonars())
         self.query = new_query(self._world(self.hearing.known), seed)
         self._interrupted = False
@@ -277,9 +280,19 @@ class NaoRobot:
 
     def _fell(self) -> None:
         self.falls += 1
+        action = self._execution.current if self._execution else None
+        if action is not None and action.name == "walk":
+            self._touched.append((*self._ahead(action), self.clock.now() + _TOUCHED_FOR))
         self._drop()
         if self.falls > self.manner.falls:
             self._ending = Ending.FALLEN
+
+    def _ahead(self, walk: nao_plan.Action) -> tuple[float, float]:
+        """The middle of what a walk ran into, in world: sonars are deaf to what is that near."""
+        x, y, heading = self.reading.pose_in_world
+        towards = heading + math.atan2(walk.left, walk.ahead)
+        apart = self.figures.radius + _TOUCHED_RADIUS
+        return x + apart * math.cos(towards), y + apart * math.sin(towards)
 
     def _start(self, plan: Solution) -> None:
         """Execute a plan from the current moment on: what is executed is skipped, the action that
@@ -351,7 +364,10 @@ class NaoRobot:
             self._posture = "Crouch"
         action = execution.current if execution else None
         grown = self.figures.radius + margin
-        discs = [(x, y, r + grown) for x, y, r in obstacles(heard)[:MOST_OBSTACLES].tolist()]
+        now = self.clock.now()
+        touched = [(x, y, _TOUCHED_RADIUS) for x, y, until in self._touched if now < until]
+        near = [*touched, *obstacles(heard).tolist()][:MOST_OBSTACLES]
+        discs = [(x, y, r + grown) for x, y, r in near]
         return plan_world(
             self._meeting_point(),
             pose=reading.pose_in_world,
