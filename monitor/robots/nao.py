@@ -94,6 +94,7 @@ class _Execution:
 _DANGER = 0.2  # metres by which a plan is worse that leads into something
 _TOUCHED_RADIUS = 0.1  # metres, of something that it fell over
 _TOUCHED_FOR = 45.0  # seconds for which that is believed to be there
+_WORTH = 0.01  # metres by which a plan must be better than to do nothing
 _FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
 
 NOTHING = {("more", 0): False}
@@ -189,7 +190,7 @@ class NaoRobot:
             if value >= value_now - (_DANGER if young else self.manner.threshold):
                 return
             self.switches += 1
-        elif value >= self.query.value_of(NOTHING) - self.manner.threshold:
+        elif value >= self.query.value_of(NOTHING) - _WORTH:
             return
         self._hopeful = self.clock.now()
         self.plans += 1
