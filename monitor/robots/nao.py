@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -12,6 +12,7 @@ from anytime.clocks import Clock
 from monitor.endings import Ending
 from monitor.missions import Energy
 from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
+from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_hearing import Hearing
 from monitor.robots.nao_planning import Errand, new_query
 from monitor.robots.nao_scenes import Goal
@@ -28,27 +29,6 @@ from planners.nao_plan import (
 from planners.query import Solution
 from sensing.sonar import Sonars
 from sensing.sonar_map import SonarMap, obstacles
-
-
-@dataclass(frozen=True)
-class Drift:
-    """What is believed of how far standing up turns the robot: a normal posterior, in radians.
-
-    Each stand-up reports its own turn up to `noise`. [PRP16] §4: +0.13 rad, both times.
-    """
-
-    mean: float = 0.0
-    variance: float = 0.05**2
-    noise: float = 0.02
-
-    def learn(self, turned: float) -> Drift:
-        """The posterior after one more stand-up."""
-        gain = self.variance / (self.variance + self.noise**2)
-        return replace(
-            self,
-            mean=self.mean + gain * (turned - self.mean),
-            variance=(1.0 - gain) * self.variance,
-        )
 
 
 @dataclass(frozen=True)

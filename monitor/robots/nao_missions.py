@@ -18,8 +18,9 @@ from monitor.missions import Energy, Mission, Value
 from monitor.monitoring import Monitor
 from monitor.policies import constant
 from monitor.reports import Frame, Report
-from monitor.robots.nao import Drift, Manner, NaoRobot
+from monitor.robots.nao import Manner, NaoRobot
 from monitor.robots.nao_body import NaoBody
+from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_floor import plan_of
 from monitor.robots.nao_planning import errands, improve
 from monitor.robots.nao_scenes import Scene

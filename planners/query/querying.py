@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from anytime.clocks import Clock, Deadline, WorkClock
 from anytime.errors import AnytimeError
 from planners.query import genetics
+from planners.query.background import Share, Turns, Worker
 from planners.query.choices import Address, Choices, Solution
 from planners.query.errors import NativeError
 from planners.query.memory import Memory
@@ -69,7 +69,7 @@ class Query:
             self._sources.expect(text)
         self._turns = Turns()
         self._best: Solution | None = None
-        self._chunk = 1  # generations of a turn
+        self.turn = 1  # generations of a turn
 
     @property
     def evaluations(self) -> int:
@@ -116,9 +116,9 @@ class Query:
             with self._turns.take():
                 self.world.take_over()
                 begun = time.perf_counter()
-                done = self._evolve(min(self._chunk, generations - made), until)
+                done = self._evolve(min(self.turn, generations - made), until)
                 each = (time.perf_counter() - begun) / done
-                self._chunk = max(1, min(_MOST, int(TURN / each))) if each > 0 else _MOST
+                self.turn = max(1, min(_MOST, int(TURN / each))) if each > 0 else _MOST
                 self._best = None
                 made += done
                 if self.value <= until:
@@ -137,10 +137,10 @@ class Query:
         """
         if isinstance(clock, WorkClock):
             each = clock.machine.seconds(self.model.name, 1.0)
-            with clock.beside(_Share(self, each)):
+            with clock.beside(Share(self, each)):
                 yield self
             return
-        worker = _Worker(self)
+        worker = Worker(self)
         worker.start()
         try:
             yield self
@@ -166,7 +166,7 @@ class Query:
         deadline = Deadline.after(seconds)
         last = self.evaluations + evaluations
         while not deadline.expired() and (left := last - self.evaluations) >= self.size:
-            self.step(int(min(self._chunk, left // self.size)), until)
+            self.step(int(min(self.turn, left // self.size)), until)
             if self.value <= until:
                 break
         return self.best
@@ -292,64 +292,6 @@ class Query:
         for name, before in kept.items():
             memory[name] = before
         return math.inf if math.isnan(value) else value
-
-
-class Turns:
-    """A lock that is handed on in the order of asking, so that a search that takes it again and
-    again keeps nobody waiting for longer than one turn."""
-
-    def __init__(self) -> None:
-        self._gate = threading.Lock()
-        self._lock = threading.Lock()
-
-    @contextmanager
-    def take(self) -> Generator[None]:
-        with self._gate:
-            self._lock.acquire()
-        try:
-            yield
-        finally:
-            self._lock.release()
-
-
-class _Worker(threading.Thread):
-    """Makes generations until it is told to end."""
-
-    def __init__(self, query: Query) -> None:
-        super().__init__(name=f"query {query.model.name}", daemon=True)
-        self._query = query
-        self._over = threading.Event()
-        self._error: BaseException | None = None
-
-    def run(self) -> None:
-        try:
-            while not self._over.is_set():
-                self._query.step(self._query._chunk)
-        except BaseException as error:
-            self._error = error
-
-    def end(self) -> None:
-        self._over.set()
-        self.join()
-        if self._error is not None:
-            raise self._error
-
-
-class _Share:
-    """Spends time that passes on a work clock on whole generations, and keeps the rest."""
-
-    def __init__(self, query: Query, seconds_per_evaluation: float) -> None:
-        self._query = query
-        self._each = seconds_per_evaluation
-        self._owed = 0.0
-
-    def __call__(self, seconds: float) -> None:
-        generation = self._query.size * self._each
-        self._owed += seconds
-        generations = int(self._owed / generation)
-        if generations:
-            self._owed -= generations * generation
-            self._query.step(generations)
 
 
 def _text(model: Model) -> Text | None:

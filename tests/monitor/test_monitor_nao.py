@@ -15,7 +15,8 @@ from monitor.endings import Ending
 from monitor.missions import Energy, Mission, Value
 from monitor.monitoring import Monitor
 from monitor.policies import constant
-from monitor.robots.nao import Drift, NaoRobot
+from monitor.robots.nao import NaoRobot
+from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_planning import errands, improve
 from monitor.robots.nao_scenes import read_scene
 from monitor.robots.simulated_nao import SimulatedNao
