@@ -253,7 +253,12 @@ class NaoRobot:
         standing = self.reading.posture in {POSTURES[posture] for posture in STANDING}
         if standing and (met or self.apart() <= self.manner.tolerance):
             self._ending = Ending.REACHED
-        elif now - self._hopeful > self.manner.patience and not self.reading.fallen:
+        elif now - self._hopeful <= self.manner.patience or self.reading.fallen:
+            return
+        elif self._touched:  # before it gives up it doubts what it touched: that may have gone
+            self._touched.clear()
+            self._hopeful = now
+        else:
             self._ending = Ending.REACHED if self._near() else Ending.BLOCKED
 
     def _near(self) -> bool:
