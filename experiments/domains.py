@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 import anytime
 import compiler
 from anytime import Machine
-from planners.atp import steps
 from planners.avoidance import blind_quality
 from planners.multipath import MultiPath
+from planners.paper_atp import steps
 from planners.path_finding import Cell, astar
 from sensing import SensedMap, instance
 from sensing.vision import Sensor, Vision, see

@@ -2,10 +2,13 @@
 
 from planners.atp import find_path, steps
 from planners.avoidance import Walk, blind_quality, blind_walk, walk
+from planners.grids import Grid
 from planners.multipath import MultiPath, Segment
+from planners.paper_atp import steps as paper_steps
 from planners.path_finding import Path, astar, length_of, route, textbook_astar, weighted_astar
 
 __all__ = [
+    "Grid",
     "MultiPath",
     "Path",
     "Segment",
@@ -15,6 +18,7 @@ __all__ = [
     "blind_walk",
     "find_path",
     "length_of",
+    "paper_steps",
     "route",
     "steps",
     "textbook_astar",

@@ -1,111 +1,304 @@
-"""ATP, the interruptible abstract planner of [ZR93] Figure 3."""
+"""ATP, the interruptible abstract planner [ZR93 §3], for maps of any kind.
+
+The paper's planner (`planners.paper_atp`) searches abstractly by obstacleness and refines segments
+between points that it has pinned. This one keeps its outline, first coarse, then ever finer where
+it is worst, and changes what fails where there are walls: abstractly it searches the graph of
+regions, whose connectivity is exact, or, on floors whose obstacles are independent of each other,
+the cells with a weight at which a search runs straight through; and it refines a whole way, in
+windows along it or a corridor around it, until the search covers the map and the way is optimal.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 import anytime
-from anytime.errors import AnytimeError
-from planners.multipath import MultiPath
-from planners.path_finding import Cell, index_of
-from planners.search import DIAGONAL, STRAIGHT, WALL, workspace
-from planners.windows import (
-    ABSTRACT,
-    COUNT,
-    FIRST,
-    FULL,
-    HEAD_SEGMENT,
-    LEVEL,
-    NEXT,
-    OBSTACLENESS,
-    Pyramid,
-    first_plan,
-    refine,
-)
+from planners import blocks, improving, tracing
+from planners.frontier import cells_of
+from planners.grids import Grid, endpoints
+from planners.improving import COUNT, GAIN, LOWEST, MEETING, UPPER, Run
+from planners.multipath import NO_WAY, MultiPath, Step, way_plan
+from planners.path_finding import Cell
+from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT, UNLIMITED
 
-HIGHEST_LEVEL = 3
-"""The paper's Lmax."""
-
-# Fewer abstract positions than this between start and goal are no plan: begin a level lower.
-_FEWEST_POSITIONS = 4
-# Expansions between two steps: as many as half the cells from start to goal and at least these, so
-# that a short plan has several steps and Python's share of a long one stays small.
-_LEAST_GRAIN = 16
-# A streamed cell is worth 1/256 of an expansion, in all places where work is counted.
-_STREAMED_PER_EXPANSION = 256
-# How much longer than planned a robot walks that bumps its way through obstacleness p: fitted to
-# blind walks on uniform floors of 10 to 35 %, 1 + p/2 + 3.5 p².
-_LINEAR, _SQUARE = 0.5, 3.5
-# The dearest believed obstacle, and the dearest abstract cell.
-_DEAREST = 250
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """What the planner did since its last step: the work, and the best plan if it is a new one."""
-
-    work: float
-    plan: MultiPath | None
+GRAIN = 1000
+"""Expansions between two steps: a fraction of a millisecond."""
+_SMALL = 64  # cells of distance up to which exact search may be all that is needed …
+_SMALL_BUDGET = 2500  # … and the expansions that it gets
+_CLUSTERED = 0.15  # clustering from which on obstacles count as walls
+_PERCOLATION = 0.407  # density of independent obstacles at which floors fall apart
+_REGION_PERCENT = 110  # weight of the search over regions
+_CORRIDOR_PERCENT = 107
+_WINDOWS = (16, 32, 64)  # cells of the windows, pass by pass …
+_WINDOW_SHARE = 3  # … which together take at most so many times the work of the coarse way
+_PATIENCE = 12  # expansions per cell of distance after which a weight was too small
 
 
 def steps(
-    domain: NDArray[np.floating],
-    start: Cell,
-    goal: Cell,
-    *,
-    highest_level: int | None = None,
-    grain: int | None = None,
+    domain: NDArray[np.floating] | Grid, start: Cell, goal: Cell, *, connectivity: int = 8
 ) -> Iterator[Step]:
-    """Plan from start to goal, abstractly at first, then in ever more detail.
+    """Plan from start to goal, coarsely at first, then ever better until the plan is optimal.
 
-    `domain` is float32 [rows, columns], the probability that a cell is blocked. A cell that is
-    blocked for certain (1.0) is impassable, a believed obstacle only dear. The first step brings a
-    plan at `highest_level` (chosen by distance, at most 3, if None), later ones refine its worst
-    segment, at least `grain` expansions a step (by distance, if None). A step without a plan found
-    none better. The last one brings the plan that is refined as far as it can be. Work is counted
-    in node expansions, with 1/256 for every cell summed.
+    `domain` is float32 [rows, columns], the probability that a cell is blocked, or a `Grid`, which
+    keeps what queries find out about the map. A cell that is blocked for certain is impassable, a
+    believed obstacle only dear. The first plan may be abstract; all others are ways from cell to
+    cell, each cheaper than the last, with `estimate` a proven bound on their quality on the map as
+    given. The last one is told once more if it took longer to prove that it is optimal. A step is
+    some `GRAIN` expansions of work; one without a plan found none better. Work is counted in nodes
+    taken from an open list, with 1/16 for every other cell or word touched and 1/256 for every cell
+    summed.
 
-    Raises AnytimeError if start or goal is outside the domain or certainly blocked. If no way leads
-    to the goal an abstract plan says nothing of it: the robot that follows it finds out. A plan
-    without any cell, of infinite length, says that the base level has no way.
+    Raises AnytimeError if start or goal is outside the domain or certainly blocked. A last plan
+    without any cell, of infinite length, says that no way exists.
     """
-    domain = np.ascontiguousarray(domain, np.float32)
-    if domain.ndim != 2 or not domain.size:
-        raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [rows, columns]")
-    first, last = index_of(start, domain.shape, "start"), index_of(goal, domain.shape, "goal")
-    for index, name, cell in ((first, "start", start), (last, "goal", goal)):
-        if domain.reshape(-1)[index] >= 1.0:
-            raise AnytimeError(
-                f"{name} cell ({cell[0]}, {cell[1]}) is blocked for certain, choose a free cell"
+    grid = domain if isinstance(domain, Grid) else Grid(domain)
+    first, last, diagonals = endpoints(grid, start, goal, connectivity)
+    run = _borrow(grid.shape)
+    try:
+        query = _Query(grid, first, last, diagonals, run)
+        best, proven = math.inf, False
+        for work in query.phases():
+            plan = None
+            if query.abstract is not None:
+                plan, query.abstract = query.abstract, None
+            if query.cost < best or (query.done and not proven and best < math.inf):
+                best, proven, plan = query.cost, query.done, query.plan()
+            yield Step(work, plan)
+        if math.isinf(best):
+            yield Step(0.0, NO_WAY)
+    finally:
+        _runs[grid.shape].append(run)
+
+
+_runs: dict[tuple[int, int], list[Run]] = {}
+
+
+def _borrow(shape: tuple[int, int]) -> Run:
+    """Arrays for a map of that size: those that an earlier planner has done with, or new ones."""
+    kept = _runs.setdefault(shape, [])
+    return kept.pop() if kept else improving.new_run(*shape)
+
+
+class _Query:
+    """One query at work: the way in hand is in `run`, and costs `cost`.
+
+    least: proven lower bound of the cost of any way. abstract: an abstract plan to be told.
+    coarse: work of the search over regions.
+    """
+
+    def __init__(self, grid: Grid, start: int, goal: int, diagonals: bool, run: Run) -> None:
+        self.grid, self.start, self.goal, self.diagonals, self.run = (
+            grid, start, goal, diagonals, run,
+        )  # fmt: skip
+        columns = grid.shape[1]
+        self.down = goal // columns - start // columns
+        self.across = goal % columns - start % columns
+        self.straight = int(improving.least_way(self.down, self.across, diagonals))
+        self.least = self.straight
+        self.cost: float = math.inf
+        self.abstract: MultiPath | None = None
+        self.coarse = 0.0
+        run.state[COUNT], run.state[MEETING] = 0, -1
+        self._map = (grid.cost, grid.wall, columns)
+
+    def phases(self) -> Iterator[float]:
+        """Work step by step; see `steps`."""
+        far = max(abs(self.down), abs(self.across))
+        if far <= _SMALL:
+            yield from self.search(100, budget=_SMALL_BUDGET)
+            if self.done:
+                return
+        density, clustering, looked = self.grid.features
+        yield looked / blocks.EXPANDED
+        if clustering < _CLUSTERED:
+            yield from self.run_through(density, far)
+            if self.done:
+                return
+            yield from self.search(_CORRIDOR_PERCENT, radius=1)
+        else:
+            yield from self.over_regions()
+            if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
+                yield from self.run_through(density, far)
+            if self.done:
+                return
+            left = _WINDOW_SHARE * self.coarse
+            for length in _WINDOWS:
+                for work in self.windows(length):
+                    yield work
+                    left -= work
+                    if left < 0:
+                        break
+                if left < 0:
+                    break
+        yield from self.search(100)
+
+    @property
+    def done(self) -> bool:
+        """Whether the way in hand is optimal, or it is proven that there is none."""
+        return self.cost <= self.least or math.isinf(self.least)
+
+    def search(
+        self, percent: int, *, radius: int | None = None, budget: int = UNLIMITED
+    ) -> Iterator[float]:
+        """Search for a better way, in a corridor of that many blocks on each side if any."""
+        run, state = self.run, self.run.state
+        known = not math.isinf(self.cost)
+        improving.begin(self.start, percent, int(self.cost) if known else SPAN, run)
+        if known:
+            improving.follow_way(*self._map, run)
+        else:
+            state[COUNT] = 0
+        if radius is not None:
+            touched = improving.confine(self.grid.shape[0], self.grid.shape[1], radius, run)
+            yield touched * blocks.TOUCHED / blocks.EXPANDED
+        spent, found = 0, OUT_OF_BUDGET
+        while found == OUT_OF_BUDGET and spent < budget:
+            most = min(GRAIN, budget - spent)
+            found, taken = improving.search(
+                *self._map, self.start, self.goal, self.diagonals, 1, run, most
             )
-    distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
-    level = _level(distance) if highest_level is None else highest_level
-    grain = max(_LEAST_GRAIN, distance // 2) if grain is None else grain
-    if not 0 <= level <= 15:
-        raise AnytimeError(f"highest_level is {level}, it must be between 0 and 15")
-    pyramid, streamed = _pyramid(domain, level)
-    if streamed < 0:
-        raise AnytimeError("the domain holds a number outside [0, 1], they must be probabilities")
-    straight = _straight(start, goal)
-    state, expansions = first_plan(pyramid, level, first, last, workspace(domain.size))
-    best = _multipath(state, pyramid, straight)
-    yield Step(float(expansions + streamed / _STREAMED_PER_EXPANSION), best)
-    done = False
-    while not done:
-        # A generator may be resumed by another thread, which has a workspace of its own.
-        state, expansions, done = refine(state, pyramid, grain, workspace(domain.size))
-        plan = _multipath(state, pyramid, straight)
-        # A base level plan's length is known, an abstract one's only believed.
-        better = plan.length < best.length or (done and plan.level == 0 < best.level)
-        best = plan if better else best
-        if expansions or better:
-            yield Step(float(expansions), plan if better else None)
+            spent += taken
+            if found == OUT_OF_BUDGET:
+                if known:
+                    self.cost = int(state[UPPER] - state[GAIN])
+                if percent == 100 and radius is None:
+                    self.least = max(self.least, int(state[LOWEST]))
+                yield float(taken)
+        if found == OUT_OF_BUDGET:
+            return
+        node = self.goal if found == improving.FOUND else int(state[MEETING])
+        if node >= 0:
+            self.cost = int(improving.take_up(*self._map, self.start, node, self.diagonals, run))
+        state[MEETING] = -1
+        if percent == 100 and radius is None:
+            self.least = self.cost
+        yield float(taken)
+
+    def run_through(self, density: float, far: int) -> Iterator[float]:
+        """A first way by a weight at which a search runs straight through independent obstacles."""
+        percent = _running_percent(density)
+        run, spent, patience = self.run, 0, _PATIENCE * far
+        improving.begin(self.start, percent, SPAN, run)
+        run.state[COUNT] = 0
+        while True:
+            found, taken = improving.search(
+                *self._map, self.start, self.goal, self.diagonals, 1, run, GRAIN
+            )
+            spent += taken
+            if found != OUT_OF_BUDGET:
+                break
+            yield float(taken)
+            if spent > patience:
+                percent, spent = min(percent + percent // 4, 1000), 0
+                improving.reweigh(self.grid.shape[1], self.goal, self.diagonals, 1, percent, run)
+        if found == NO_PATH:
+            self.least = math.inf
+        else:
+            self.cost = int(
+                improving.take_up(*self._map, self.start, self.goal, self.diagonals, run)
+            )
+            if percent == 100:
+                self.least = self.cost
+        yield float(taken)
+
+    def over_regions(self) -> Iterator[float]:
+        """A first way over the graph of regions: abstract, then from cell to cell."""
+        grid, run = self.grid, _borrow_regions(self.grid.shape)
+        cost, wall, columns = self._map
+        soft = (cost, wall, grid.dearest, columns)
+        try:
+            work = blocks.begin_regions(*soft, self.start, self.goal, grid.regions, run)
+            found = OUT_OF_BUDGET
+            while found == OUT_OF_BUDGET:
+                found, taken = blocks.search_regions(
+                    *soft, self.goal, self.diagonals, _REGION_PERCENT, grid.regions, run,
+                    GRAIN * blocks.EXPANDED // 4,
+                )  # fmt: skip
+                work += taken
+                self.coarse += taken / blocks.EXPANDED
+                if found == OUT_OF_BUDGET:
+                    yield work / blocks.EXPANDED
+                    work = 0
+            if found == NO_PATH:
+                if wall == 0:
+                    self.least = math.inf
+                yield work / blocks.EXPANDED
+                return
+            pins, way, touched = tracing.pins_of(
+                columns, self.goal, self.diagonals, grid.regions, run
+            )
+        finally:
+            _region_runs[grid.shape].append(run)
+        self.abstract = self._abstract(pins)
+        yield (work + touched * blocks.TOUCHED) / blocks.EXPANDED
+        count, touched = tracing.connect(
+            *soft, pins, way, grid.regions, self.diagonals, self.run.path
+        )
+        self.run.state[COUNT] = count
+        self._weigh()
+        yield touched * blocks.TOUCHED / blocks.EXPANDED
+
+    def windows(self, length: int) -> Iterator[float]:
+        """Make the way optimal in windows of that many cells, one after the other."""
+        state, done = self.run.state, False
+        state[improving.POSITION] = 0
+        while not done:
+            done, taken = improving.improve_windows(
+                *self._map, length, self.diagonals, 1, self.run, GRAIN // 2
+            )
+            state[MEETING] = -1
+            self._weigh()
+            yield float(taken)
+
+    def _weigh(self) -> None:
+        count = int(self.run.state[COUNT])
+        self.cost = int(improving.way_cost(*self._map, self.run.path, 0, count - 1))
+
+    def plan(self) -> MultiPath:
+        """The best way so far, as a plan without any abstraction."""
+        way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
+        return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
+
+    def _abstract(self, pins: NDArray[np.int32]) -> MultiPath:
+        """The regions' blocks as a plan of their level; its length is that over the pins."""
+        columns = self.grid.shape[1]
+        level = blocks.SIDE.bit_length() - 1
+        plan = np.empty((len(pins) - 1, 3), np.int32)
+        plan[:, 0] = level
+        plan[:, 1], plan[:, 2] = pins[:-1] // columns >> level, pins[:-1] % columns >> level
+        downs, across = np.diff(pins // columns), np.diff(pins % columns)
+        length = sum(
+            improving.least_way(a, b, self.diagonals) for a, b in zip(downs, across, strict=True)
+        )
+        return MultiPath(
+            plan,
+            np.array([0, len(plan)], np.int32),
+            np.zeros(1),
+            float(length) / STRAIGHT,
+            self.straight / STRAIGHT,
+        )
+
+
+_region_runs: dict[tuple[int, int], list[blocks.RegionRun]] = {}
+
+
+def _borrow_regions(shape: tuple[int, int]) -> blocks.RegionRun:
+    kept = _region_runs.setdefault(shape, [])
+    return kept.pop() if kept else blocks.new_region_run(*shape)
+
+
+def _running_percent(density: float) -> int:
+    """The weight for independent obstacles of a density.
+
+    From some weight on, a search among them costs a constant for every cell of distance, and below
+    it ever more: fitted to floors of 10 to 35 %, 1 + p / (1 - (p/.407)^5).
+    """
+    p = min(density, 0.95 * _PERCOLATION)
+    return round(100 * (1.0 + p / (1.0 - (p / _PERCOLATION) ** 5)))
 
 
 @anytime.module(estimate=lambda plan: plan.estimate, name="atp")
@@ -114,121 +307,3 @@ def find_path(domain, start, goal):
     for step in steps(domain, start, goal):
         anytime.charge(step.work)
         yield step.plan
-
-
-def _level(distance: int) -> int:
-    level = HIGHEST_LEVEL
-    while level > 0 and distance >> level < _FEWEST_POSITIONS:
-        level -= 1
-    return level
-
-
-def _straight(start: Cell, goal: Cell) -> float:
-    near, far = sorted((abs(start[0] - goal[0]), abs(start[1] - goal[1])))
-    return far - near + near * math.sqrt(2)
-
-
-def _multipath(state, pyramid: Pyramid, straight: float) -> MultiPath:
-    plan, bounds, blocked, length = _flatten(state, pyramid)
-    believed = max(float(length), straight) if len(plan) else math.inf
-    return MultiPath(plan, bounds, blocked, believed, straight)
-
-
-def _costs() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the search cost of a base cell and of an abstract one by its obstacleness.
-
-    On the base level by the odds, abstractly by length and obstacleness together.
-    """
-    p = np.arange(FULL + 1) / FULL
-    odds = p[:-1] / (1.0 - p[:-1])
-    base = np.minimum(1.0 + 4.0 * odds, _DEAREST) + 0.5
-    abstract = ABSTRACT * (1.0 + _LINEAR * p + _SQUARE * p * p) + 0.5
-    return np.append(base, WALL).astype(np.uint8), abstract.astype(np.uint8)
-
-
-_BASE_COST, _ABSTRACT_COST = _costs()
-
-
-@njit(cache=True, nogil=True)
-def _pyramid(domain, highest):
-    """Sum a domain up to its obstacleness on all levels: (pyramid, cells streamed, -1 if invalid).
-
-    Cells outside the map count as blocked.
-    """
-    rows, columns = domain.shape
-    offset, widths = np.zeros(highest + 2, np.int64), np.zeros(highest + 1, np.int64)
-    height, width = rows, columns
-    for level in range(highest + 1):
-        widths[level] = width
-        offset[level + 1] = offset[level] + height * width
-        height, width = (height + 1) // 2, (width + 1) // 2
-    obstacleness = np.empty(offset[highest + 1], np.int32)
-    cost = np.empty(offset[highest + 1], np.uint8)
-    pyramid = Pyramid(obstacleness, cost, offset, widths)
-    streamed = rows * columns
-    for row in range(rows):
-        for column in range(columns):
-            p = float(domain[row, column])
-            if not 0.0 <= p <= 1.0:
-                return pyramid, -1
-            # Rounded down, so that only what is certain counts as full.
-            obstacleness[row * columns + column] = int(p * FULL)
-            cost[row * columns + column] = _BASE_COST[int(p * FULL)]
-    for level in range(1, highest + 1):
-        below, here, width = offset[level - 1], offset[level], widths[level - 1]
-        height = (here - below) // width
-        streamed += here - below
-        there = here
-        for row in range(0, height, 2):
-            for column in range(0, width, 2):
-                first = below + row * width + column
-                if row + 1 < height and column + 1 < width:
-                    total = obstacleness[first] + obstacleness[first + 1] + 2
-                    total += obstacleness[first + width] + obstacleness[first + width + 1]
-                else:
-                    # At the edge the diagonal one and at least one of these are outside.
-                    total = obstacleness[first] + FULL + 2
-                    total += obstacleness[first + 1] if column + 1 < width else FULL
-                    total += obstacleness[first + width] if row + 1 < height else FULL
-                obstacleness[there] = total >> 2
-                cost[there] = _ABSTRACT_COST[total >> 2]
-                there += 1
-    return pyramid, streamed
-
-
-@njit(cache=True, nogil=True)
-def _flatten(state, pyramid):
-    """List all cells of a plan in order: (plan, bounds, obstacleness, believed length)."""
-    segments, cells, number = 0, 0, int(state.size[HEAD_SEGMENT])
-    while number >= 0:
-        segments += 1
-        cells += int(state.segment[number, COUNT])
-        number = int(state.segment[number, NEXT])
-    plan = np.empty((cells, 3), np.int32)
-    bounds = np.zeros(segments + 1, np.int32)
-    obstacleness = np.empty(segments)
-    segments, cells, length = 0, 0, 0.0
-    number = int(state.size[HEAD_SEGMENT])
-    while number >= 0:
-        level, first = int(state.segment[number, LEVEL]), int(state.segment[number, FIRST])
-        columns, base = pyramid.columns[level], pyramid.offset[level]
-        before, before_row, before_column = 0.0, 0, 0
-        for place in range(int(state.segment[number, COUNT])):
-            there = int(state.cell[first + place])
-            row, column = there // columns, there % columns
-            plan[cells, 0] = level
-            plan[cells, 1] = row
-            plan[cells, 2] = column
-            cells += 1
-            p = pyramid.obstacleness[base + there] / FULL
-            through = 1.0 + _LINEAR * p + _SQUARE * p * p
-            if place > 0:
-                straight = row == before_row or column == before_column
-                step = (STRAIGHT if straight else DIAGONAL) << level
-                length += step * (before + through) / (2.0 * STRAIGHT)
-            before, before_row, before_column = through, row, column
-        obstacleness[segments] = state.segment[number, OBSTACLENESS] / FULL
-        segments += 1
-        bounds[segments] = cells
-        number = int(state.segment[number, NEXT])
-    return plan, bounds, obstacleness, length

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from planners.frontier import cells_of
 from planners.path_finding import Cell, flat, index_of
 from planners.search import STRAIGHT, UNLIMITED, workspace
-from planners.windows import REACHED, UNREACHABLE, cells_of
+from planners.windows import REACHED, UNREACHABLE
 from planners.windows import walk as _walk
 
 # The longest level of a plan's cell: a block of 2^15 cells is wider than any map.

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+
+from planners.search import DIAGONAL, STRAIGHT
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +32,14 @@ class MultiPath:
     `plan` is int32 [n, 3] of (level, row, column), all segments one after the other; `bounds` is
     int32 [m + 1], segment i is `plan[bounds[i]:bounds[i + 1]]`; `obstacleness` is float [m].
     `length` is what the planner believes that will be walked, in cells (infinite where it knows of
-    no way), and `straight` the least that it can be (octile distance).
+    no way), and `least` the least that it can be: the octile distance, or what is proven beyond it.
     """
 
     plan: NDArray[np.int32]
     bounds: NDArray[np.int32]
     obstacleness: NDArray[np.float64]
     length: float
-    straight: float
+    least: float
 
     @cached_property
     def segments(self) -> tuple[Segment, ...]:
@@ -54,8 +57,9 @@ class MultiPath:
 
     @property
     def estimate(self) -> float:
-        """Straight distance / believed length, in [0, 1]: what is visible of the quality."""
-        return min(1.0, self.straight / self.length) if self.length > 0 else 1.0
+        """Least possible / believed length, in [0, 1]: a bound on the quality of a way from cell to
+        cell, and what is visible of that of an abstract plan."""
+        return min(1.0, self.least / self.length) if self.length > 0 else 1.0
 
     def __str__(self) -> str:
         levels = ", ".join(
@@ -63,3 +67,35 @@ class MultiPath:
             for level in sorted({segment.level for segment in self.segments}, reverse=True)
         )
         return f"plan of {self.length:.1f} cells: {levels or 'nothing to walk'}"
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """What a planner did since its last step: the work, and the best plan if it is a new one."""
+
+    work: float
+    plan: MultiPath | None
+
+
+def way_plan(cells: NDArray[np.int32], diagonal: int, cost: float, least: float) -> MultiPath:
+    """A plan without any abstraction: a way from cell to cell.
+
+    `cells` is int32 [n, 2], `diagonal` of whose steps are diagonal. `cost` is what the search says
+    of it (10 000 a straight step over a cell of cost 1), `least` a proven lower bound of that.
+    Where believed obstacles are crossed, `length` counts them as what they cost.
+    """
+    plan = np.zeros((len(cells), 3), np.int32)
+    plan[:, 1:] = cells
+    # Counted rather than summed, so that equal ways have equal lengths to the last bit.
+    diagonal = int(diagonal)  # numba leaves it an int, plain numpy an int64
+    straight = max(len(cells) - 1, 0) - diagonal
+    length = straight + diagonal * math.sqrt(2)
+    dear = cost - (straight * STRAIGHT + diagonal * DIAGONAL)
+    if dear > 0:
+        length += dear / STRAIGHT
+    bound = min(1.0, least / cost) if cost > 0 else 1.0
+    return MultiPath(plan, np.array([0, len(plan)], np.int32), np.zeros(1), length, bound * length)
+
+
+NO_WAY = MultiPath(np.empty((0, 3), np.int32), np.zeros(1, np.int32), np.zeros(0), math.inf, 0.0)
+"""The plan that says that the base level has no way."""

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
-from planners.atp import HIGHEST_LEVEL, steps
 from planners.avoidance import Walk, walk
 from planners.multipath import MultiPath
+from planners.paper_atp import HIGHEST_LEVEL, steps
 from planners.path_finding import Cell, Path, astar, route
 from sensing import Belief, SensedMap
 from sensing.sensed_maps import disc

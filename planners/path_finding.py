@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from planners.frontier import cells_of, path_to
 from planners.search import NO_PATH, UNLIMITED, WALL, Workspace, bucket_search, workspace
-from planners.windows import cells_of, path_to, window_search
+from planners.windows import window_search
 
 Cell = tuple[int, int]
 

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from planners.frontier import next_base, octile, path_to, pop, sift_up, step_cost
 from planners.search import (
     CLOSED,
     DIAGONAL,
-    LAST,
     NO_PATH,
     OUT_OF_BUDGET,
     SPAN,
@@ -28,85 +28,6 @@ from planners.search import (
 # numba compiles a callee once more for every literal argument; these are no literals.
 YES, ZERO, CHEAPEST, EXACT = np.bool_(True), np.int64(0), np.int64(1), np.int64(100)
 IMPASSABLE, ENDLESS = np.int64(WALL), np.int64(UNLIMITED)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def octile(rows, columns):
-    """Return the length of the shortest 8-connected way over a free rectangle."""
-    rows, columns = abs(rows), abs(columns)
-    if rows > columns:
-        return STRAIGHT * rows + (DIAGONAL - STRAIGHT) * columns
-    return STRAIGHT * columns + (DIAGONAL - STRAIGHT) * rows
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def next_base(work):
-    """Start a generation of labels that all earlier ones lie below."""
-    if work.clock[0] >= LAST:
-        work.label[:] = 0
-        work.clock[0] = 0
-    work.clock[0] += SPAN
-    return work.clock[0]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _before(one, other, key, label):
-    """Tell whether the heap serves `one` first: lower f, then greater g (a lower label)."""
-    a, b = key[one], key[other]
-    return a < b or (a == b and label[one] < label[other])
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _sift_up(place, node, heap, slot, key, label):
-    """Move `node` up from `place`; `slot` is each node's place in the heap."""
-    while place > 0:
-        parent = np.int64(heap[(place - 1) >> 1])
-        if not _before(node, parent, key, label):
-            break
-        heap[place] = parent
-        slot[parent] = place
-        place = (place - 1) >> 1
-    heap[place] = node
-    slot[node] = place
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _pop(size, heap, slot, key, label):
-    """Take the first node from a heap of `size`; the heap then holds one less."""
-    first, node, place = np.int64(heap[0]), np.int64(heap[size - 1]), 0
-    size -= 1
-    while 2 * place + 1 < size:
-        child = 2 * place + 1
-        if child + 1 < size and _before(
-            np.int64(heap[child + 1]), np.int64(heap[child]), key, label
-        ):
-            child += 1
-        moved = np.int64(heap[child])
-        if not _before(moved, node, key, label):
-            break
-        heap[place] = moved
-        slot[moved] = place
-        place = child
-    if size > 0:
-        heap[place] = node
-        slot[node] = place
-    slot[first] = CLOSED
-    return first
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def step_cost(cost, wall, columns, node, dr, dc):
-    """Return what the step (dr, dc) costs, or 0 where it is not allowed (the map's edge apart)."""
-    there = node + dr * columns + dc
-    dearest = int(cost[there])
-    if dearest == wall:
-        return 0
-    if dr == 0 or dc == 0:
-        return STRAIGHT * dearest
-    beside, below = int(cost[node + dc]), int(cost[node + dr * columns])
-    if beside == wall or below == wall:
-        return 0
-    return DIAGONAL * max(dearest, beside, below)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -128,7 +49,7 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
     slot[start] = 0
     size, expansions = np.int64(1), 0
     while size > 0:
-        node = _pop(size, heap, slot, key, label)
+        node = pop(size, heap, slot, key, label)
         size -= 1
         row, column = node // columns, node % columns
         if goal_top <= row < goal_bottom and goal_left <= column < goal_right:
@@ -180,61 +101,14 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
             else:
                 h = floor * STRAIGHT * (down + across)
             label[there] = base - g - step
-            key[there] = g + step + h * percent // 100
+            f = g + step + h * percent // 100
             if known:
                 place = np.int64(slot[there])
             else:
                 place = size
                 size += 1
-            _sift_up(place, there, heap, slot, key, label)
+            sift_up(place, there, f, heap, slot, key, label)
     return NO_PATH, expansions
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def cells_of(path, columns):
-    """Return a path as int32 [n, 2] cells, and how many of its steps are diagonal."""
-    cells, diagonal = np.empty((path.size, 2), np.int32), 0
-    for place in range(path.size):
-        cells[place, 0] = path[place] // columns
-        cells[place, 1] = path[place] % columns
-        if place > 0 and cells[place, 0] != cells[place - 1, 0]:
-            diagonal += cells[place, 1] != cells[place - 1, 1]
-    return cells, diagonal
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def path_to(cost, wall, columns, start, node, diagonals, work):
-    """Read the path from `start` to `node` back from the labels of the last search."""
-    rows, base, label = cost.size // columns, work.clock[0], work.label
-    path = np.empty(64, np.int32)
-    count = 0
-    while True:
-        if count == path.size:
-            longer = np.empty(2 * count, np.int32)
-            longer[:count] = path
-            path = longer
-        path[count] = node
-        count += 1
-        if node == start:
-            return path[:count][::-1].copy()
-        row, column = node // columns, node % columns
-        best, best_label = node, base - SPAN
-        for dr in range(-1, 2):
-            if row + dr < 0 or row + dr >= rows:
-                continue
-            for dc in range(-1, 2):
-                if column + dc < 0 or column + dc >= columns:
-                    continue
-                if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
-                    continue
-                there = node + dr * columns + dc
-                if label[there] <= label[node]:
-                    continue
-                step = step_cost(cost, wall, columns, there, -dr, -dc)
-                # Every label is the length of a real way, so the best neighbour is closer by it.
-                if step > 0 and label[there] - step > best_label:
-                    best, best_label = there, label[there] - step
-        node = best
 
 
 # How far beyond its ends a window reaches at first, and how much wider the next one is. A target

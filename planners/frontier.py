@@ -1,0 +1,150 @@
+"""What every search over a grid needs: labels without clearing, a heap, steps, reading a path back.
+
+A grid is flat bytes of costs: `wall` is impassable, every other value at least 1. A step costs
+10 000 straight and 14 142 diagonally, times the dearest cell that it sweeps; a diagonal sweeps both
+orthogonal cells, so corners are never cut. Labels and bases are those of `planners.search`.
+
+Kernels of other files call these. numba's cache does not see such a callee change, so whoever
+imports kernels from here also states this file's digest (a test compares): a change here then
+touches the callers' files, and their machine code is made anew.
+"""
+
+import numpy as np
+from numba import njit
+
+from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def octile(rows, columns):
+    """Return the length of the shortest 8-connected way over a free rectangle."""
+    rows, columns = abs(rows), abs(columns)
+    if rows > columns:
+        return STRAIGHT * rows + (DIAGONAL - STRAIGHT) * columns
+    return STRAIGHT * columns + (DIAGONAL - STRAIGHT) * rows
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def least_way(rows, columns, diagonals):
+    """Return the length of the shortest way over a free rectangle, with diagonals or without."""
+    if diagonals:
+        return octile(rows, columns)
+    return STRAIGHT * (abs(rows) + abs(columns))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def next_base(work):
+    """Start a generation of labels that all earlier ones lie below."""
+    if work.clock[0] >= LAST:
+        work.label[:] = 0
+        work.clock[0] = 0
+    work.clock[0] += SPAN
+    return work.clock[0]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sift_up(place, node, f, heap, slot, key, label):
+    """Put `node` into the heap at `place`, or above it: lower f first, then greater g.
+
+    `key` is the f of every place of the heap, so that comparing reads one stretch of memory; `slot`
+    is each node's place.
+    """
+    mine = label[node]
+    while place > 0:
+        above = (place - 1) >> 1
+        parent = np.int64(heap[above])
+        if f > key[above] or (f == key[above] and mine >= label[parent]):
+            break
+        heap[place], key[place] = parent, key[above]
+        slot[parent] = place
+        place = above
+    heap[place], key[place] = node, f
+    slot[node] = place
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pop(size, heap, slot, key, label):
+    """Take the first node from a heap of `size`; the heap then holds one less."""
+    first, node, place = np.int64(heap[0]), np.int64(heap[size - 1]), 0
+    f, mine = key[size - 1], label[node]
+    size -= 1
+    while 2 * place + 1 < size:
+        child = 2 * place + 1
+        if child + 1 < size and (
+            key[child + 1] < key[child]
+            or (key[child + 1] == key[child] and label[heap[child + 1]] < label[heap[child]])
+        ):
+            child += 1
+        moved = np.int64(heap[child])
+        if f < key[child] or (f == key[child] and mine <= label[moved]):
+            break
+        heap[place], key[place] = moved, key[child]
+        slot[moved] = place
+        place = child
+    if size > 0:
+        heap[place], key[place] = node, f
+        slot[node] = place
+    slot[first] = CLOSED
+    return first
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def step_cost(cost, wall, columns, node, dr, dc):
+    """Return what the step (dr, dc) costs, or 0 where it is not allowed (the map's edge apart)."""
+    there = node + dr * columns + dc
+    dearest = int(cost[there])
+    if dearest == wall:
+        return 0
+    if dr == 0 or dc == 0:
+        return STRAIGHT * dearest
+    beside, below = int(cost[node + dc]), int(cost[node + dr * columns])
+    if beside == wall or below == wall:
+        return 0
+    return DIAGONAL * max(dearest, beside, below)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def cells_of(path, columns):
+    """Return a path as int32 [n, 2] cells, and how many of its steps are diagonal."""
+    cells, diagonal = np.empty((path.size, 2), np.int32), 0
+    for place in range(path.size):
+        cells[place, 0] = path[place] // columns
+        cells[place, 1] = path[place] % columns
+        if place > 0 and cells[place, 0] != cells[place - 1, 0]:
+            diagonal += cells[place, 1] != cells[place - 1, 1]
+    return cells, diagonal
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def path_to(cost, wall, columns, start, node, diagonals, work):
+    """Read the path from `start` to `node` back from the labels of the last search."""
+    rows, base, label = cost.size // columns, work.clock[0], work.label
+    path = np.empty(64, np.int32)
+    count = 0
+    while True:
+        if count == path.size:
+            longer = np.empty(2 * count, np.int32)
+            longer[:count] = path
+            path = longer
+        path[count] = node
+        count += 1
+        if node == start:
+            return path[:count][::-1].copy()
+        row, column = node // columns, node % columns
+        best, best_label = node, base - SPAN
+        for dr in range(-1, 2):
+            if row + dr < 0 or row + dr >= rows:
+                continue
+            for dc in range(-1, 2):
+                if column + dc < 0 or column + dc >= columns:
+                    continue
+                if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
+                    continue
+                there = node + dr * columns + dc
+                if label[there] <= label[node]:
+                    continue
+                step = step_cost(cost, wall, columns, there, -dr, -dc)
+                # Every label is the length of a real way, so the best neighbour is closer by it.
+                if step > 0 and label[there] - step > best_label:
+                    best, best_label = there, label[there] - step
+        node = best

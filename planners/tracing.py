@@ -1,0 +1,226 @@
+"""From a way over regions to a way over cells: pins where borders are crossed, lines between them.
+
+Where no line goes from one pin to the next, both in a region of at most 64 cells, the way is found
+there by waves of a word: all cells that can be reached in one step more, eight ways at a time.
+"""
+
+import numpy as np
+from numba import njit
+
+from planners.blocks import (
+    FIRST_COLUMN,
+    FIRST_ROW,
+    LAST_BIT,
+    LAST_ROW,
+    MOST,
+    NOT_FIRST,
+    NOT_LAST,
+    ONE,
+    SIDE,
+    SIDE_BITS,
+    ZERO,
+)
+from planners.frontier import least_way, step_cost
+from planners.search import DIAGONAL, SPAN
+
+TAUT = 4
+"""How often pins are drawn taut."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pins_of(columns, goal, diagonals, regions, run):
+    """The cells over which the regions found lead: the start, each region's pin, the goal.
+
+    The search chose pins when it did not know yet where they lead; here each is drawn taut between
+    its neighbours, `TAUT` times. Returns (pins, the regions that they
+    enter, cells touched).
+    """
+    count, region = 2, run.state[2]
+    while run.parent[region] >= 0:
+        count += 1
+        region = run.parent[region]
+    pins, way = np.empty(count, np.int32), np.empty(count - 1, np.int64)
+    pins[count - 1] = goal
+    region = run.state[2]
+    for place in range(count - 2, -1, -1):
+        pins[place] = run.pin[region]
+        way[place] = region
+        region = run.parent[region]
+    across, touched = (columns + SIDE - 1) // SIDE, 0
+    for turn in range(TAUT):
+        for step in range(1, count - 1):
+            place = step if turn % 2 == 0 else count - 1 - step
+            here, block = way[place], way[place] // MOST
+            side = way[place - 1] // MOST - block
+            before, after = np.int64(pins[place - 1]), np.int64(pins[place + 1])
+            first = block // across * SIDE * columns + block % across * SIDE
+            mask, other = regions.mask[here], regions.mask[way[place - 1]]
+            if side == -across:
+                join, stride = mask & FIRST_ROW & (other >> LAST_ROW), 1
+            elif side == across:
+                join, stride = (mask >> LAST_ROW) & FIRST_ROW & other, 1
+                first += (SIDE - 1) * columns
+            elif side == -1:
+                join, stride = mask & FIRST_COLUMN & (other >> LAST_BIT), columns
+            else:
+                join, stride = (mask >> LAST_BIT) & FIRST_COLUMN & other, columns
+                first += SIDE - 1
+            least = SPAN
+            for along in range(SIDE):
+                bit = along if stride == 1 else along * SIDE
+                if (join >> np.uint64(bit)) & ONE == ZERO:
+                    continue
+                touched += 1
+                cell = first + along * stride
+                row, column = cell // columns, cell % columns
+                there = least_way(row - before // columns, column - before % columns, diagonals)
+                there += least_way(row - after // columns, column - after % columns, diagonals)
+                if there < least:
+                    least = there
+                    pins[place] = cell
+    return pins, way, touched
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _line(cost, wall, dearest, columns, start, goal, diagonals, straight_first, path, count):
+    """Append a least way of two legs to a path, after its last cell, which is `start`.
+
+    Returns (cells of the path then, or 0 if something is in the way; cells touched).
+    """
+    down, across = goal // columns - start // columns, goal % columns - start % columns
+    high, wide = abs(down), abs(across)
+    dr, dc = np.sign(down), np.sign(across)
+    if diagonals:
+        slant, ahead = min(high, wide), max(high, wide) - min(high, wide)
+        leg_dr, leg_dc = (dr, 0) if high > wide else (0, dc)
+        other_dr, other_dc, other = dr, dc, slant
+    else:
+        leg_dr, leg_dc, ahead = dr, 0, high
+        other_dr, other_dc, other = 0, dc, wide
+    node, touched = start, 0
+    for leg in range(2):
+        first = (leg == 0) == straight_first
+        step_r, step_c, steps = (leg_dr, leg_dc, ahead) if first else (other_dr, other_dc, other)
+        for _ in range(steps):
+            touched += 1
+            step = step_cost(cost, wall, columns, node, step_r, step_c)
+            if step == 0 or step > DIAGONAL * dearest:
+                return 0, touched
+            node += step_r * columns + step_c
+            path[count] = node
+            count += 1
+    return count, touched
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _wave(reached, mask, diagonals):
+    """The cells of a region that one more step leads to, with those already reached."""
+    east, west = (mask >> ONE) & NOT_LAST, (mask << ONE) & NOT_FIRST
+    south, north = mask >> SIDE_BITS, mask << SIDE_BITS
+    more = ((reached << ONE) & NOT_FIRST) | ((reached >> ONE) & NOT_LAST)
+    more |= (reached << SIDE_BITS) | (reached >> SIDE_BITS)
+    if diagonals:  # both orthogonal cells are free, so corners are not cut
+        more |= ((reached & east & south) << (SIDE_BITS + ONE)) & NOT_FIRST
+        more |= ((reached & west & south) << (SIDE_BITS - ONE)) & NOT_LAST
+        more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
+        more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
+    return (more & mask) | reached
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _within(mask, start, goal, diagonals, steps):
+    """A way with the fewest steps between two cells of a region, straight ones where it can.
+
+    Cells are bits; the way is written backwards into `steps`. Returns (its steps, words touched).
+    """
+    waves = np.empty(SIDE * SIDE + 1, np.uint64)
+    waves[0] = ONE << np.uint64(start)
+    count, target = 0, ONE << np.uint64(goal)
+    while waves[count] & target == ZERO:
+        waves[count + 1] = _wave(waves[count], mask, diagonals)
+        count += 1
+    here = goal
+    for step in range(count):
+        steps[step] = here
+        row, column = here // SIDE, here % SIDE
+        before, found = waves[count - 1 - step], -1
+        for side in range(8 if diagonals else 4):
+            dr = (-1, 1, 0, 0, -1, -1, 1, 1)[side]
+            dc = (0, 0, -1, 1, -1, 1, -1, 1)[side]
+            if not (0 <= row + dr < SIDE and 0 <= column + dc < SIDE):
+                continue
+            there = (row + dr) * SIDE + column + dc
+            if (before >> np.uint64(there)) & ONE == ZERO:
+                continue
+            if side >= 4:
+                beside = (mask >> np.uint64(row * SIDE + column + dc)) & ONE
+                below = (mask >> np.uint64((row + dr) * SIDE + column)) & ONE
+                if beside == ZERO or below == ZERO:
+                    continue
+            found = there
+            break
+        here = found
+    return count, 2 * count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def connect(cost, wall, dearest, columns, pins, way, regions, diagonals, path):
+    """Write the way over the pins into `path`: straight over as many as nothing stands between,
+    within a region where it bends.
+
+    Returns (cells of the way, cells and words touched).
+    """
+    across = (columns + SIDE - 1) // SIDE
+    path[0] = pins[0]
+    count, here, touched = np.int64(1), 0, 0
+    steps = np.empty(SIDE * SIDE, np.int64)
+    while here < pins.size - 1:
+        start = np.int64(pins[here])
+        # Twice as far as long as it goes, then between the last that went and the first that not.
+        reached, failed, ahead, straight_first = here, pins.size, 1, True
+        while reached + 1 < failed:
+            to = (reached + failed) // 2
+            if failed == pins.size:
+                to = min(here + ahead, pins.size - 1)
+                ahead *= 2
+            end = np.int64(0)
+            for turn in range(2):
+                if end == 0:
+                    end, taken = _line(
+                        cost, wall, dearest, columns, start, np.int64(pins[to]), diagonals,
+                        turn == 0, path, count,
+                    )  # fmt: skip
+                    touched += taken
+                    first = turn == 0
+            if end == 0:
+                failed = to
+            else:
+                reached, straight_first = to, first
+                if to == pins.size - 1:
+                    break
+        if reached > here:  # the last try may have written over the way that went
+            count, taken = _line(
+                cost, wall, dearest, columns, start, np.int64(pins[reached]), diagonals,
+                straight_first, path, count,
+            )  # fmt: skip
+            touched += taken
+            here = reached
+            continue
+        goal = np.int64(pins[here + 1])
+        block = way[here] // MOST
+        top, left = block // across * SIDE, block % across * SIDE
+        # The cell of this region from which the next is entered; the last pin lies in this one.
+        row = min(max(goal // columns, top), top + SIDE - 1)
+        column = min(max(goal % columns, left), left + SIDE - 1)
+        begin = (start // columns - top) * SIDE + start % columns - left
+        end = (row - top) * SIDE + column - left
+        taken, words = _within(regions.mask[way[here]], begin, end, diagonals, steps)
+        touched += words
+        for step in range(taken - 1, -1, -1):
+            path[count] = (top + steps[step] // SIDE) * columns + left + steps[step] % SIDE
+            count += 1
+        if row * columns + column != goal:
+            path[count] = goal
+            count += 1
+        here += 1
+    return count, touched
