@@ -55,13 +55,13 @@ def test_it_stands_up_and_goes_round_though_nothing_tells_it_to(program):
     postures = [frame.story["posture"] for frame in frames]
     assert postures[0] == "Sit"
     assert postures[-1] in ("Stand", "StandInit", "StandZero")
-    assert max(abs(y) for frame in frames for _, y, _ in frame.story["path"]) > 0.1
+    assert max(abs(y) for frame in frames for _, y, _ in frame.story["motion"]["track"]) > 0.1
 
 
 def test_a_mission_repeats_to_the_bit(program):
     runs = [live(program, "appearing", 1) for _ in range(2)]
-    tracks = [[frame.story["path"] for frame in run[3]] for run in runs]
-    assert tracks[0] == tracks[1]
+    stories = [[frame.story for frame in run[3]] for run in runs]
+    assert stories[0] == stories[1]
     assert runs[0][0].seconds == runs[1][0].seconds
 
 
