@@ -41,7 +41,7 @@ class ScenePlan:
         story: dict[str, Any] = dict(frame.story)
         story["motion"] = self._motion(story["motion"])
         if isinstance(story.get("belief"), SonarMap):
-            story["belief"] = self._believed(story["belief"])
+            story["belief"] = self.believed(story["belief"])
         return replace(frame, story=story)
 
     def _motion(self, told: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,7 +82,7 @@ class ScenePlan:
         ways = [self._at(x, y) for x, y in places]
         return ways[:1] + [after for before, after in pairwise(ways) if after != before]
 
-    def _believed(self, heard: SonarMap) -> NDArray[np.float64]:
+    def believed(self, heard: SonarMap) -> NDArray[np.float64]:
         """What was heard, on the cells of the floor, with its density where nothing is known.
 
         A sonar map begins as good as free; so that the page can tell what was heard to be free from

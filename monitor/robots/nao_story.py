@@ -83,7 +83,8 @@ class Story:
         executes: whether a plan is in execution. discs: obstacles believed (x, y, radius), from
         which the robot's middle keeps `clearance`. radius: of the robot.
         """
-        self.track.append(reading.pose_in_world)
+        if reading.pose_in_world != self.track[-1]:
+            self.track.append(reading.pose_in_world)
         track, comparisons, events = self.track, self._comparisons, self._events
         self.track, self._comparisons, self._events = track[-1:], [], []
         return {
