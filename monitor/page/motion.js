@@ -24,11 +24,11 @@ function drawMotion(canvas, pen, unit, ratio) {
     pen.fillStyle = INK; pen.fillText(content, left, top);
   };
 
-  for (let cell = 0; cell < scene.rows * scene.columns; cell++) {  // the truth, faint, also where it is believed to be free
-    if (!wall(cell)) continue;
-    pen.fillStyle = "rgba(140,128,100,.26)";
-    pen.fillRect(x(cell % scene.columns * scene.step), y(Math.floor(cell / scene.columns) * scene.step), x(scene.step) + .5, y(scene.step) + .5);
+  pen.beginPath();  // the truth, faint, also where it is believed to be free
+  for (let cell = 0; cell < scene.rows * scene.columns; cell++) {
+    if (wall(cell)) pen.rect(x(cell % scene.columns * scene.step), y(Math.floor(cell / scene.columns) * scene.step), x(scene.step), y(scene.step));
   }
+  pen.fillStyle = "rgba(140,128,100,.26)"; pen.fill();
   for (const [row, column, bearing, half, reach, heard] of now.cones) {
     pen.beginPath(); pen.moveTo(x(column), y(row));
     pen.arc(x(column), y(row), (heard ?? reach) * unit, -bearing - half, -bearing + half); pen.closePath();
@@ -54,12 +54,6 @@ function drawMotion(canvas, pen, unit, ratio) {
     line(one.other, one.taken ? GIVEN_UP : OTHER, 2, one.taken ? [2, 5] : [7, 5]);
   }
   line(track, "#fff", 4); line(track, BLUE, 2.2);
-  for (const each of seen) for (const [, what] of each.events) {
-    const [top, left] = each.track[each.track.length - 1], size = 6 * ratio;
-    pen.beginPath(); pen.moveTo(x(left) - size, y(top) - size); pen.lineTo(x(left) + size, y(top) + size);
-    pen.moveTo(x(left) + size, y(top) - size); pen.lineTo(x(left) - size, y(top) + size);
-    stroke("#fff", 5.5); stroke(RED, 2.6); words(what, x(left), y(top) - now.radius * unit - 10 * ratio);
-  }
 
   const [row, column, heading] = now.track[now.track.length - 1], cos = Math.cos(heading), sin = -Math.sin(heading);
   disc(row, column, now.radius); pen.fillStyle = "rgba(0,114,178,.28)"; pen.fill(); stroke("#fff", 4); stroke(BLUE, 2.2);
@@ -69,6 +63,12 @@ function drawMotion(canvas, pen, unit, ratio) {
   pen.closePath(); pen.fillStyle = BLUE; pen.fill();
   const goal = now.goal ?? [scene.goal[0] + .5, scene.goal[1] + .5];
   star(pen, x(goal[1]), y(goal[0]), 9 * ratio, ratio);
+  for (const each of seen) for (const [, what] of each.events) {
+    const [top, left] = each.track[each.track.length - 1], size = 6 * ratio;
+    pen.beginPath(); pen.moveTo(x(left) - size, y(top) - size); pen.lineTo(x(left) + size, y(top) + size);
+    pen.moveTo(x(left) + size, y(top) - size); pen.lineTo(x(left) - size, y(top) + size);
+    stroke("#fff", 5.5); stroke(RED, 2.6); words(what, x(left), y(top) - now.radius * unit - 10 * ratio);
+  }
   for (const [top, left, bearing, , , heard] of now.cones) {
     if (heard === null) continue;
     const reach = heard * unit + 30 * ratio;

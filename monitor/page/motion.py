@@ -27,7 +27,12 @@ def verdict(comparison: Comparison) -> str:
     if comparison.idle:
         if comparison.taken:
             return f"Began a plan: it was {apart} than doing nothing, more than {limit}."
-        return f"Did nothing: the best plan was {apart} than that, and {limit} was not met."
+        if gain < _SAME:
+            return (
+                "Did nothing: no plan was found that is better, with an objective of "
+                f"{metres(comparison.held)}."
+            )
+        return f"Did nothing: the best plan was {apart} than that, less than {limit}."
     if comparison.taken:
         return f"Switched: another plan was {apart}, more than {limit}."
     if abs(gain) < _SAME:
