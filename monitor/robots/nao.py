@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from anytime.clocks import Clock
 from monitor.endings import Ending
 from monitor.missions import Energy
-from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
+from monitor.robots.nao_body import LYING, LinkLostError, NaoBody, Outcome, Reading
 from monitor.robots.nao_drift import Drift
+from monitor.robots.nao_execution import Execution, command, leads
 from monitor.robots.nao_hearing import Hearing
 from monitor.robots.nao_odometry import FROZEN, Odometry
 from monitor.robots.nao_planning import Errand, new_query
 from monitor.robots.nao_scenes import Goal
-from monitor.robots.nao_story import Story, Way
+from monitor.robots.nao_story import Story
 from monitor.states import Situation
 from planners import nao_plan
 from planners.nao import POSTURES, STAND, STANDING, Body
@@ -25,7 +26,6 @@ from planners.nao_plan import (
     actions_of,
     made_before,
     plan_world,
-    trajectory,
 )
 from planners.query import Solution
 from sensing.sonar import Sonars
@@ -49,27 +49,6 @@ class Manner:
     falls: int = 3
     patience: float = 8.0
     plans: int | None = None
-
-
-@dataclass
-class _Execution:
-    """A plan in execution, action by action.
-
-    done: actions that are complete. began: when the one that goes on began, of whatever plan it
-    was then. heading: of the robot then. rises: whether it stands up.
-    """
-
-    solution: Solution
-    actions: tuple[nao_plan.Action, ...]
-    done: int = 0
-    began: float = 0.0
-    running: Action | None = None
-    heading: float = 0.0
-    rises: bool = False
-
-    @property
-    def current(self) -> nao_plan.Action | None:
-        return self.actions[self.done] if self.done < len(self.actions) else None
 
 
 _DANGER = 0.2  # metres by which a plan is worse that leads into something
@@ -115,7 +94,7 @@ class NaoRobot:
         self._energy = self._driven = 0.0
         self._since = self._presented = clock.now()
         self._hopeful = self._since  # when a plan last brought it nearer
-        self._execution: _Execution | None = None
+        self._execution: Execution | None = None
         self._posture = "Crouch"  # the last one that had a name
         self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
         self.hearing = Hearing(self, sonars or Sonars())
@@ -143,11 +122,11 @@ class NaoRobot:
 
         Over NAOqi the driver has looked at the pose already, and nothing is found here.
         """
-        told, jumps = self.body.read(), self.odometry.jumps
-        pose = self.odometry.believe(told.time, told.pose_in_world, told.moving)
+        reading, jumps = self.body.read(), self.odometry.jumps
+        pose = self.odometry.believe(reading.time, reading.pose_in_world, reading.moving)
         if self.odometry.jumps > jumps:
             self._story.happened(self._elapsed(), "odometry jumped")
-        return replace(told, pose_in_world=pose)
+        return replace(reading, pose_in_world=pose)
 
     # --- What the monitor asks for.
 
@@ -200,8 +179,8 @@ class NaoRobot:
             threshold=threshold,
             idle=execution is None,
             taken=better,
-            plan=_leads(kept, world) if kept else (),
-            other=_leads(other, world) if other and other != kept else (),
+            plan=leads(kept, world) if kept else (),
+            other=leads(other, world) if other and other != kept else (),
         )
         return better
 
@@ -309,7 +288,7 @@ class NaoRobot:
         """Execute a plan from the current moment on: what is executed is skipped, the action that
         goes on in part."""
         before = self._execution
-        made = _Execution(plan, actions_of(plan.choices))
+        made = Execution(plan, actions_of(plan.choices))
         if before is not None:
             made.done = before.done
             if made.current == before.current:  # nothing changes before its end
@@ -318,7 +297,7 @@ class NaoRobot:
         self._execution = made
         self._go_on(made)
 
-    def _go_on(self, execution: _Execution) -> None:
+    def _go_on(self, execution: Execution) -> None:
         """Begin the next action when one has ended."""
         while execution.running is None or (outcome := self._outcome(execution)) is not None:
             if execution.running is not None:
@@ -339,9 +318,9 @@ class NaoRobot:
             execution.began = self.clock.now()
             execution.heading = self.reading.pose_in_world[2]
             execution.rises = self._rises(action)
-            execution.running = self._command(action)
+            execution.running = command(self.body, self.clock, action)
 
-    def _outcome(self, execution: _Execution) -> Outcome | None:
+    def _outcome(self, execution: Execution) -> Outcome | None:
         """How the action in execution ended, if it did. A walk that odometry does not see is broken
         off: nobody knows where it leads."""
         assert execution.running is not None
@@ -362,15 +341,6 @@ class NaoRobot:
             and int(action.ahead) in STANDING
             and self.reading.posture not in {POSTURES[posture] for posture in STANDING}
         )
-
-    def _command(self, action: nao_plan.Action) -> Action:
-        if action.name == "walk":
-            return self.body.walk(action.ahead, action.left, 0.0)
-        if action.name == "turn":
-            return self.body.walk(0.0, 0.0, action.ahead)
-        if action.name == "posture":
-            return self.body.posture(POSTURES[int(action.ahead)])
-        return _Pause(self.clock, action.ahead)
 
     # --- What plans are simulated in.
 
@@ -421,22 +391,3 @@ class NaoRobot:
     def _elapsed(self) -> float:
         """Seconds since the task was presented."""
         return self.clock.now() - self._presented
-
-
-def _leads(actions: Iterable[nao_plan.Action], world: Mapping[str, Any]) -> Way:
-    """Where the rest of a plan leads, as a world foresees it."""
-    return [(pose.x, pose.y) for pose in trajectory(actions, world)]
-
-
-class _Pause:
-    """Waiting, as an action."""
-
-    def __init__(self, clock: Clock, seconds: float) -> None:
-        self._clock = clock
-        self._until = clock.now() + seconds
-
-    def poll(self) -> Outcome | None:
-        return Outcome.DONE if self._clock.now() >= self._until - 1e-9 else None
-
-    def cancel(self) -> None:
-        self._until = self._clock.now()
