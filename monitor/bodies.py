@@ -60,7 +60,7 @@ class Robot(Protocol):
         """What to log of the frame that just ended, as plain data.
 
         `planned` and `length`, of the plan and of what was really walked, are needed for
-        calibration; `path` and `plan` are drawn.
+        calibration; `path`, `plan` and `motion`, a `monitor.log_lines.Motion`, are drawn.
         """
         ...
 

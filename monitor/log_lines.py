@@ -86,6 +86,61 @@ class CallLine(_Line, frozen=True):
     fault: str | None
 
 
+class Comparison(_Line, frozen=True):
+    """The plan in execution beside the best other one, at a time.
+
+    held, found: their objectives, in metres; the less the better. idle: no plan was in execution,
+    and `held` is that of doing nothing. threshold: by how much `found` must be less. taken: it took
+    the place. other: where the plan leads that was not taken, or was given up for it; empty if
+    there is none or it is the same.
+    """
+
+    time: float
+    held: float
+    found: float
+    threshold: float
+    idle: bool
+    taken: bool
+    other: tuple[tuple[float, float], ...] = ()
+
+
+class SonarCone(_Line, frozen=True):
+    """What a range sensor looks at, and what it told at last: `heard` is None for no echo.
+
+    bearing: of its middle. reach: how far it hears.
+    """
+
+    row: float
+    column: float
+    bearing: float
+    half_angle: float
+    reach: float
+    heard: float | None
+
+
+class Motion(_Line, frozen=True):
+    """What a robot that moves in metres tells of a frame, as it was at the frame's end.
+
+    Places are (row, column) and lengths are in cells of the map, with fractions: (0, 0) is the
+    upper left corner of the first cell. Angles are counterclockwise from the direction of the
+    columns; times are seconds since the task was presented.
+    track: row, column and heading, from the frame's start on. radius: of the robot. plan: where the
+    plan in execution leads, as it was foreseen when it was last compared. discs: obstacles believed
+    (row, column, radius), from which the robot's middle keeps `clearance`. events: what is worth a
+    mark, and when.
+    """
+
+    track: tuple[tuple[float, float, float], ...]
+    radius: float
+    plan: tuple[tuple[float, float], ...] = ()
+    goal: tuple[float, float] | None = None
+    discs: tuple[tuple[float, float, float], ...] = ()
+    clearance: float = 0.0
+    cones: tuple[SonarCone, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+    events: tuple[tuple[float, str], ...] = ()
+
+
 class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
     """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed."""
 
@@ -112,8 +167,8 @@ class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
 class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):
     """A frame. so_far: value of completing at its end − price × energy used until then.
 
-    path: cells walked. plan: (level, row, column) of the plan executed. prices: net value of one
-    more second for each call.
+    path: cells walked. plan: (level, row, column) of the plan executed. motion: of a robot that
+    moves in metres. prices: net value of one more second for each call.
     """
 
     index: int
@@ -130,6 +185,7 @@ class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):
     path: tuple[Cell, ...] = ()
     plan: tuple[tuple[int, int, int], ...] = ()
     belief: Box | None = None
+    motion: Motion | None = None
     prices: dict[str, float | None] | None = None
     story: dict[str, Any] = {}
 

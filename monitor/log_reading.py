@@ -93,6 +93,8 @@ def _check_mission(line: MissionLine, where: str) -> None:
 def _check_frame(line: FrameLine, mission: MissionLine, where: str) -> None:
     if not line.moments:
         raise AnytimeError(f"{where}: a frame has at least one moment, its decision")
+    if line.motion is not None and not line.motion.track:
+        raise AnytimeError(f"{where}: a motion has at least one place in its track")
     box = line.belief
     if box is None:
         return

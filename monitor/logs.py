@@ -119,8 +119,8 @@ class LogWriter:
         self._write(line)
 
     def frame(self, frame: Frame) -> None:
-        """Write a frame. Of its story are drawn: `path`, `plan`, and `belief`, an array of
-        probabilities of being blocked or an object with `probabilities()`."""
+        """Write a frame. Of its story are drawn: `path`, `plan`, `motion`, and `belief`, an array
+        of probabilities of being blocked or an object with `probabilities()`."""
         if self._mission is None:
             raise AnytimeError(f"{self.path}: write the mission before its frames")
         self._energy += frame.energy
@@ -158,6 +158,8 @@ class LogWriter:
             "belief": self._changed(belief),
             "story": story,
         }
+        if "motion" in story:
+            line["motion"] = story.pop("motion")
         if frame.decision.why.prices:
             line["prices"] = dict(frame.decision.why.prices)
         self._write(line)

@@ -245,6 +245,8 @@ def call_text(call: CallLine) -> str:
 
 def speed_unit(log: Log) -> str:
     """Unit of speeds."""
+    if log.frames and log.frames[0].motion is not None:
+        return "m/s"
     return "cells/s" if log.mission.scene else "lengths/s"
 
 

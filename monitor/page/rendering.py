@@ -13,8 +13,10 @@ from anytime.files import write_atomically
 from anytime.pictures import duration, number
 from monitor.log_lines import FrameLine, Log, MomentLine
 from monitor.logs import plain
-from monitor.page import answers
+from monitor.page import answers, motion
 from monitor.page.losses import costliest, loss_of, waterfall
+
+_SCRIPTS = ("drawing.js", "map.js", "motion.js", "charts.js", "replay.js")
 
 
 def render(log: Log) -> str:
@@ -44,7 +46,7 @@ def render_all(
         "live": "true" if live else "false",
         # In a script element `<` alone can end or nest it; the separators are JavaScript's.
         "data": _safe(json.dumps(data, separators=(",", ":"), allow_nan=False)),
-        "code": _part("replay.js"),
+        "code": "".join(map(_part, _SCRIPTS)),
     }
     page = _part("template.html")
     for key, text in parts.items():
@@ -104,6 +106,8 @@ def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
         "profile": answers.profile(log),
         "compared": answers.compared(log),
         "job": end.job if end else 0.0,
+        "opens": motion.opening(log),
+        "switching": motion.switching(log),
     }
 
 
@@ -124,6 +128,7 @@ def _scene(log: Log) -> dict[str, Any] | None:
         "rows": scene.rows,
         "columns": scene.columns,
         "step": scene.step,
+        "resolution": scene.resolution,
         "start": scene.start,
         "goal": scene.goal,
         "radius": scene.radius,
@@ -150,6 +155,7 @@ def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> di
         "path": frame.path,
         "plan": frame.plan,
         "belief": [box.row, box.column, box.rows, box.columns, box.levels] if box else None,
+        "motion": motion.drawn(frame),
         "calls": [
             {
                 "label": call.label,
@@ -181,7 +187,7 @@ def _moment(
         "chosen": answers.worth_at(moment, moment.contract),
         "worth": answers.worth_of(moment),
         "prices": prices,
-        "headline": answers.headline(log, frame, moment),
+        "headline": motion.headline(frame) or answers.headline(log, frame, moment),
         "why": answers.why(log, frame, moment),
         "fixed": answers.fixed(log, frame, moment, division),
         "price": answers.price(frame, moment, prices),

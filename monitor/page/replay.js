@@ -1,5 +1,4 @@
-"use strict";
-(() => {
+// What is shown: a mission, a frame, a decision; and what leads from one to the next.
 const $ = id => document.getElementById(id);
 const live = document.body.dataset.live === "true";
 let data = JSON.parse($("data").textContent);
@@ -7,362 +6,6 @@ let tab = 0, at = 0, moment = 0;  // shown: mission, frame, decision in the fram
 const run = () => data.runs[tab];
 const frame = () => run().frames[at];
 
-// ---- drawing with SVG; every mark has a pattern or a label beside its colour
-const INK = "#22222a", SOFT = "#6d6a66", RULE = "#e0dcd3", FAINT = "#f3f0e9", RED = "#c2410c";
-const HUES = ["#0072b2", "#e69f00", "#009e73", "#a8558a", "#56b4e9", "#8a6d3b"];
-const TONE = {drive: "#4a4a55", wait: "#b9b3a6", overrun: RED, job: "#009e73", energy: "#e69f00"};
-const SVG = "http://www.w3.org/2000/svg";
-function make(tag, attributes = {}, ...children) {
-  const node = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, value);
-  for (const child of children) node.append(child);
-  return node;
-}
-const text = (x, y, content, more = {}) => make("text", {x, y, ...more}, String(content));
-function picture(id, height, title) {
-  const home = $(id), width = Math.max(240, home.clientWidth);
-  const svg = make("svg", {viewBox: `0 0 ${width} ${height}`, height, role: "img", "aria-label": title});
-  svg.append(make("title", {}, title));
-  home.replaceChildren(svg);
-  return [svg, width];
-}
-const HATCHES = [
-  null, "M0 6L6 0M-1 1L1 -1M5 7L7 5", "M0 3H6", "M3 0V6", "M0 0L6 6M-1 5L1 7M5 -1L7 1", "M0 3H6M3 0V6",
-];
-function fills(svg, names) {  // name -> fill: the hue, with lines over it that tell it apart in grey
-  const shades = {}, defs = make("defs");
-  names.forEach((name, index) => {
-    const hue = TONE[name] || HUES[run().labels.indexOf(name) % HUES.length] || HUES[0];
-    const marks = {drive: 0, wait: 1, overrun: 4, job: 2, energy: 2}[name] ?? [0, 1, 3, 2, 5][index % 5];
-    if (!HATCHES[marks]) { shades[name] = hue; return; }
-    const id = `${svg.parentNode.id}-${index}`;
-    defs.append(make("pattern", {id, width: 6, height: 6, patternUnits: "userSpaceOnUse"},
-      make("rect", {width: 6, height: 6, fill: hue, opacity: name === "wait" ? .55 : .75}),
-      make("path", {d: HATCHES[marks], stroke: name === "wait" ? "#6d6a66" : "#fff", "stroke-width": 1.3, fill: "none"})));
-    shades[name] = `url(#${id})`;
-  });
-  svg.append(defs);
-  return shades;
-}
-function number(value) {
-  if (value === null || value === undefined) return "—";
-  const shown = Math.abs(value) < 10 ? value.toFixed(2) : value.toFixed(1);
-  return Math.abs(value) < 1 && !/^-?0\.00$/.test(shown) ? shown.replace("0.", ".").replace("-", "−") : shown.replace("-", "−");
-}
-function duration(seconds) {
-  if (seconds === 0) return "0";
-  return Math.abs(seconds) < 1 ? `${Math.round(1e3 * seconds)} ms` : `${seconds.toFixed(seconds < 10 ? 2 : 1)} s`;
-}
-function ticks(low, high, count) {
-  const raw = (high - low) / count || 1, power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map(n => n * power).find(n => n >= raw) || raw;
-  const marks = [];
-  for (let mark = Math.ceil(low / step - 1e-9) * step; mark <= high + 1e-9 * step; mark += step) marks.push(Math.abs(mark) < step / 1e6 ? 0 : mark);
-  return [marks, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
-}
-function pressable(node, label, act) {
-  node.classList.add("hit");
-  node.append(make("title", {}, label));
-  node.addEventListener("click", act);
-  return node;
-}
-
-// ---- map
-const bytes = content => Uint8Array.from(atob(content), letter => letter.charCodeAt(0));
-let belief = null;  // {run, upTo, levels}: the belief is logged as changes, so it is replayed
-function believed() {
-  const {rows, columns, density} = run().scene;
-  if (!belief || belief.run !== run() || belief.upTo > at) {
-    belief = {run: run(), upTo: -1, levels: new Uint8Array(rows * columns).fill(Math.round(15 * density))};
-  }
-  while (belief.upTo < at) {
-    const box = run().frames[++belief.upTo].belief;
-    if (!box) continue;
-    const [top, left, height, width, packed] = box, pairs = bytes(packed);
-    for (let cell = 0; cell < height * width; cell++) {
-      const pair = pairs[cell >> 1];
-      belief.levels[(top + Math.floor(cell / width)) * columns + left + cell % width] = cell & 1 ? pair & 15 : pair >> 4;
-    }
-  }
-  return belief.levels;
-}
-let truth = null;
-function wall(cell) {
-  if (!truth || truth.run !== run()) truth = {run: run(), bits: bytes(run().scene.truth)};
-  return !(truth.bits[cell >> 3] >> (7 - (cell & 7)) & 1);
-}
-const blend = (from, to, share) => from.map((part, index) => part + (to[index] - part) * share);
-function drawMap() {
-  const scene = run().scene, canvas = $("map");
-  document.querySelector(".desk").classList.toggle("bare", !scene);
-  document.querySelector(".map").hidden = !scene;
-  if (!scene) return;
-  const {rows, columns, step} = scene, unknown = Math.round(15 * scene.density);
-  const width = canvas.clientWidth, ratio = Math.min(window.devicePixelRatio || 1, 3);
-  const height = Math.round(width * rows / columns);
-  canvas.style.height = `${height}px`;
-  canvas.width = width * ratio; canvas.height = height * ratio;
-  const levels = believed();
-  const small = document.createElement("canvas");
-  small.width = columns; small.height = rows;
-  const image = new ImageData(columns, rows);
-  for (let cell = 0; cell < rows * columns; cell++) {
-    const level = levels[cell];
-    let colour = wall(cell) ? [222, 217, 206] : [243, 240, 233];  // the truth, faint, where nothing is known
-    if (level > unknown) colour = blend(colour, [38, 40, 56], (level - unknown) / (15 - unknown));
-    if (level < unknown) colour = blend(colour, [255, 255, 255], (unknown - level) / unknown);
-    image.data.set([...colour, 255], 4 * cell);
-  }
-  small.getContext("2d").putImageData(image, 0, 0);
-  const pen = canvas.getContext("2d"), scale = canvas.width / columns;
-  pen.imageSmoothingEnabled = scale < 1;
-  pen.drawImage(small, 0, 0, canvas.width, canvas.height);
-  const x = column => (column + .5) / step * scale, y = row => (row + .5) / step * scale;
-  const line = (cells, style, thick, dash = []) => {
-    if (cells.length < 2) return;
-    pen.beginPath();
-    cells.forEach(([row, column], index) => index ? pen.lineTo(x(column), y(row)) : pen.moveTo(x(column), y(row)));
-    pen.strokeStyle = style; pen.lineWidth = thick * ratio; pen.setLineDash(dash.map(part => part * ratio));
-    pen.lineJoin = pen.lineCap = "round"; pen.stroke(); pen.setLineDash([]);
-  };
-  const middles = plan => plan.map(([level, row, column]) => [(row + .5) * 2 ** level - .5, (column + .5) * 2 ** level - .5]);
-  const now = frame(), next = run().frames[at + 1];
-  for (let index = 0; index < at; index++) line(run().frames[index].path, "rgba(0,114,178,.55)", 1.6);
-  const plan = middles(now.plan);
-  line(plan, "rgba(255,255,255,.9)", 9); line(plan, "rgba(230,159,0,.85)", 6);
-  if (next) { line(middles(next.plan), "#fff", 5); line(middles(next.plan), RED, 2.4, [7, 6]); }
-  line(now.path, "#fff", 5); line(now.path, "#0072b2", 2.6);
-  const here = now.path.length ? now.path[0] : scene.start, there = now.path.length ? now.path[now.path.length - 1] : here;
-  pen.beginPath(); pen.arc(x(here[1]), y(here[0]), scene.radius / step * scale, 0, 7);
-  pen.strokeStyle = "#0072b2"; pen.lineWidth = 1.2 * ratio; pen.setLineDash([2 * ratio, 4 * ratio]); pen.stroke(); pen.setLineDash([]);
-  const dot = ([row, column], radius, fill, edge) => {
-    pen.beginPath(); pen.arc(x(column), y(row), radius * ratio, 0, 7);
-    pen.fillStyle = fill; pen.fill(); pen.lineWidth = 2 * ratio; pen.strokeStyle = edge; pen.stroke();
-  };
-  dot(scene.start, 3, "#fff", INK);
-  dot(there, 3.5, "#fff", "#0072b2");
-  dot(here, 6, "#0072b2", "#fff");
-  const [gx, gy, g] = [x(scene.goal[1]), y(scene.goal[0]), 8 * ratio];
-  pen.lineWidth = 2 * ratio; pen.strokeStyle = "#fff"; pen.fillStyle = "#009e73";
-  pen.beginPath();
-  for (let point = 0; point < 10; point++) {
-    const reach = point % 2 ? g * .45 : g, turn = Math.PI * point / 5;
-    pen.lineTo(gx + reach * Math.sin(turn), gy - reach * Math.cos(turn));
-  }
-  pen.closePath(); pen.stroke(); pen.fill();
-  canvas.setAttribute("aria-label", `Map, frame ${at}: robot at row ${here[0]}, column ${here[1]}, goal at row ${scene.goal[0]}, column ${scene.goal[1]}`);
-}
-function drawLegend() {
-  const signs = [
-    ["robot", make("circle", {cx: 10, cy: 7, r: 5, fill: "#0072b2"})],
-    ["goal", make("path", {d: "M10 0L12 5H18L13 8L15 14L10 10L5 14L7 8L2 5H8Z", fill: "#009e73"})],
-    ["walked", make("path", {d: "M1 7H19", stroke: "#0072b2", "stroke-width": 2.4})],
-    ["plan", make("path", {d: "M1 7H19", stroke: "#e69f00", "stroke-width": 6, opacity: .85})],
-    ["next plan", make("path", {d: "M1 7H19", stroke: RED, "stroke-width": 2.4, "stroke-dasharray": "6 4"})],
-    ["looks this far", make("circle", {cx: 10, cy: 7, r: 6, fill: "none", stroke: "#0072b2", "stroke-dasharray": "2 2.4"})],
-    ["believed blocked", make("rect", {x: 3, width: 14, height: 14, fill: "#26283a"})],
-    ["believed free", make("rect", {x: 3.5, y: .5, width: 13, height: 13, fill: "#fff", stroke: RULE})],
-    ["wall nobody saw", make("rect", {x: 3, width: 14, height: 14, fill: "#ded9ce"})],
-  ];
-  $("legend").replaceChildren(...signs.map(([name, mark]) => {
-    const item = document.createElement("li");
-    item.append(make("svg", {width: 20, height: 14, viewBox: "0 0 20 14"}, mark), name);
-    return item;
-  }));
-}
-
-// ---- charts
-function drawCurve() {
-  const now = frame().moments[moment], points = now.curve.filter(point => point[1] !== null);
-  if (points.length < 2 || !frame().calls.length) { $("curve").replaceChildren(); return; }
-  const height = 190, [svg, width] = picture("curve", height, "Net value against contract time");
-  const left = 40, right = width - 12, top = 24, bottom = height - 36;
-  const xs = points.map(point => point[0]), ys = points.map(point => point[1]);
-  const fixed = run().fixed ?? null, least = Math.min(...xs), most = Math.max(...xs);
-  const narrow = least > .5 * most;  // contracts that differ little fill the chart; others begin at 0
-  const x0 = narrow ? least - .06 * (most - least) : 0, x1 = Math.max(most, now.contract), high = Math.max(...ys);
-  // The least contracts may be a disaster; the lowest quarter is cut off so that the peak can be seen.
-  const sorted = [...ys].sort((a, b) => a - b), quarter = sorted[Math.floor(ys.length / 4)];
-  const low = high - quarter < .5 * (high - sorted[0]) ? quarter - .6 * (high - quarter) : sorted[0];
-  const pad = (high - low || 1) * .12, y0 = low - pad, y1 = high + pad * 1.6;
-  const X = value => left + (right - left) * (value - x0) / (x1 - x0 || 1);
-  const Y = value => bottom - (bottom - top) * (value - y0) / (y1 - y0);
-  const [rows, digits] = ticks(y0, y1, 4);
-  for (const mark of rows) {
-    svg.append(make("path", {d: `M${left} ${Y(mark)}H${right}`, stroke: RULE}), text(left - 6, Y(mark) + 4, mark.toFixed(digits), {"text-anchor": "end"}));
-  }
-  const [columns, places] = ticks(x0, x1, width < 360 ? 4 : 6);
-  for (const mark of columns) svg.append(text(X(mark), bottom + 16, `${mark.toFixed(places)}`, {"text-anchor": "middle"}));
-  svg.append(text(right, height - 4, "seconds of contract", {"text-anchor": "end"}), text(0, 11, "net value foreseen"));
-  const clip = make("clipPath", {id: "curve-clip"}, make("rect", {x: left, y: top, width: right - left + 4, height: bottom - top}));
-  const line = make("g", {"clip-path": "url(#curve-clip)"});
-  line.append(make("polyline", {points: points.map(([a, b]) => `${X(a)},${Y(b)}`).join(" "), fill: "none", stroke: INK, "stroke-width": 1.8, "stroke-linejoin": "round"}));
-  for (const [a, b] of points) line.append(pressable(make("circle", {cx: X(a), cy: Y(b), r: 2.2, fill: INK}), `${duration(a)}: ${number(b)}`, () => {}));
-  svg.append(clip, line);
-  if (fixed !== null && fixed >= x0 && fixed <= x1) {
-    svg.append(make("path", {d: `M${X(fixed)} ${bottom + 3}V${top + 12}`, stroke: SOFT, "stroke-dasharray": "2 3"}),
-      text(X(fixed) + 4, bottom - 5, "fixed"));
-  } else if (fixed !== null) {
-    const before = fixed < x0;
-    svg.append(text(before ? left + 4 : right, bottom - 5, before ? `← fixed, ${duration(fixed)}` : `fixed, ${duration(fixed)} →`, {"text-anchor": before ? "start" : "end"}));
-  }
-  const peak = points.reduce((best, point) => point[1] > best[1] ? point : best);
-  svg.append(make("circle", {cx: X(peak[0]), cy: Y(peak[1]), r: 9, fill: "none", stroke: RED, "stroke-width": 1.6}));
-  if (now.chosen !== null) svg.append(make("circle", {cx: X(now.contract), cy: Y(now.chosen), r: 5, fill: RED}));
-  const same = Math.abs(peak[0] - now.contract) < 1e-6 + .01 * x1;
-  const label = (spot, level, words) => {
-    const end = X(spot) + 16 + 6.3 * words.length > right;
-    svg.append(text(X(spot) + (end ? -14 : 14), Y(level) - 8, words, {class: "strong", "text-anchor": end ? "end" : "start"}));
-  };
-  label(peak[0], peak[1], same ? `chosen: the peak, ${duration(now.contract)}` : `peak, ${duration(peak[0])}`);
-  if (!same && now.chosen !== null) svg.append(text(X(now.contract), Y(now.chosen) + 20, `chosen, ${duration(now.contract)}`, {class: "strong", "text-anchor": "middle"}));
-}
-function drawShares() {
-  const now = frame(), chosen = now.moments[moment], names = run().labels;
-  const line = 34, height = names.length * line + 2, [svg, width] = picture("shares", height, "Shares of the contract");
-  const shades = fills(svg, names);
-  const left = Math.min(120, Math.max(64, 8 * Math.max(...names.map(name => name.length)) + 10));
-  const right = width - 118;
-  const longest = Math.max(1e-9, ...names.map(name => chosen.shares[name] || 0), ...now.calls.map(call => call.elapsed));
-  names.forEach((name, index) => {
-    const y = index * line + 5, share = chosen.shares[name] || 0, call = now.calls.find(each => each.label === name);
-    const price = chosen.prices[name];
-    svg.append(text(0, y + 13, name, {class: "strong"}));
-    svg.append(make("rect", {x: left, y, width: now.calls.length ? Math.max(1, (right - left) * share / longest) : 0, height: 16, fill: shades[name]}));
-    if (call) {
-      const used = left + (right - left) * call.elapsed / longest;
-      svg.append(pressable(make("path", {d: `M${left} ${y + 20}H${used}M${used} ${y + 16.5}V${y + 23.5}`, stroke: call.overrun > 0 ? RED : INK, "stroke-width": 1.6}), call.text, () => {}));
-    }
-    const taken = !now.calls.length ? "not called" : call ? `${duration(share)}, took ${duration(call.elapsed)}` : duration(share);
-    svg.append(text(width, y + 13, taken, {"text-anchor": "end"}));
-    if (price !== undefined && price !== null) svg.append(text(width, y + 27, `${price >= 0 ? "+" : ""}${number(price)} a second`, {"text-anchor": "end"}));
-  });
-}
-function drawLanes() {
-  const it = run(), job = it.job > 0 ? ["job"] : [];
-  const names = [...it.labels, "drive", "wait", ...job, "overrun"];
-  const wide = $("lanes").clientWidth > 560, gutter = wide ? 92 : 68, tall = 84, lane = 24;
-  const height = tall + names.length * lane + 26, [svg, width] = picture("lanes", height, "Lanes of the mission over time");
-  const shades = fills(svg, names), end = Math.max(it.seconds, 1e-9);
-  const X = time => gutter + (width - gutter - 8) * time / end, now = frame();
-  svg.append(make("rect", {x: X(now.started), y: 0, width: Math.max(2, X(now.ended) - X(now.started)), height: height - 20, fill: "#fbe9c6"}));
-  const values = it.frames.flatMap(each => [each.so_far, ...each.moments.map(one => one.net)]).filter(value => value !== null);
-  const low = Math.min(...values), high = Math.max(...values), Y = value => tall - 12 - (tall - 26) * (value - low) / (high - low || 1);
-  const foreseen = it.frames.some(each => each.moments[0].net !== null);
-  svg.append(text(0, 22, "net value"), text(0, 37, "so far –"), text(0, 52, foreseen ? "foreseen ●" : ""));
-  svg.append(make("polyline", {points: it.frames.map(each => `${X(each.ended)},${Y(each.so_far)}`).join(" "), fill: "none", stroke: SOFT, "stroke-dasharray": "4 3"}));
-  const seen = it.frames.flatMap((each, index) => each.moments.map((one, order) => ({...one, index, order}))).filter(one => one.net !== null);
-  svg.append(make("polyline", {points: seen.filter(one => !one.order).map(one => `${X(one.time)},${Y(one.net)}`).join(" "), fill: "none", stroke: "#0072b2", "stroke-width": 1.2, opacity: .7}));
-  names.forEach((name, index) => {
-    const y = tall + index * lane;
-    svg.append(make("path", {d: `M${gutter} ${y + lane - 4}H${width - 8}`, stroke: RULE}), text(0, y + 15, name, {class: "strong"}));
-  });
-  const bar = (name, from, to, label, index) => {
-    if (to <= from) return;
-    const y = tall + names.indexOf(name) * lane;
-    svg.append(pressable(make("rect", {x: X(from), y: y + 4, width: Math.max(1, X(to) - X(from) - .8), height: lane - 9, fill: shades[name]}), label, () => go(index)));
-  };
-  it.frames.forEach((each, index) => {
-    const moved = each.started + each.driven;
-    bar("drive", each.started, moved, `frame ${index}: drove ${duration(each.driven)}`, index);
-    bar("wait", moved, each.ended, `frame ${index}: stood ${duration(each.ended - moved)}`, index);
-    for (const call of each.calls) {
-      const over = call.started + call.elapsed - call.overrun;
-      bar(call.label, call.started, call.started + call.elapsed, `frame ${index}, ${call.text}`, index);
-      bar("overrun", over, call.started + call.elapsed, `frame ${index}, ${call.text}`, index);
-    }
-  });
-  if (job.length) bar("job", end - it.job, end, `job ${duration(it.job)}`, it.frames.length - 1);
-  const most = Math.max(1e-9, ...seen.map(one => one.worth)), room = Math.min(1, (width - gutter) / it.frames.length / 11);
-  for (const one of seen) {
-    const current = one.index === at && one.order === moment;
-    svg.append(pressable(make("circle", {cx: X(one.time), cy: Y(one.net), r: 1.6 + 4 * room * Math.sqrt(one.worth / most), fill: one.order ? "#fff" : "#0072b2", stroke: current ? RED : "#0072b2", "stroke-width": current ? 2.4 : 1}),
-      `frame ${one.index}, ${one.kind === "call" ? "decided again" : "decided"}: ${number(one.net)} foreseen, worth ${number(one.worth)} over the mean contract`, () => go(one.index, one.order)));
-  }
-  const [marks, digits] = ticks(0, end, wide ? 10 : 4);
-  for (const mark of marks) svg.append(text(X(mark), height - 6, mark.toFixed(digits), {"text-anchor": "middle"}));
-  svg.append(text(0, height - 6, "seconds"));
-}
-function drawWaterfall() {
-  const steps = run().waterfall, line = 25;
-  const height = steps.length * line, [svg, width] = picture("waterfall", height, "From the worth of the task to its net value");
-  const shades = fills(svg, ["drive", "wait", "energy", "job"]);
-  const left = 82, right = width - 58, low = Math.min(0, ...steps.flatMap(step => [step.before, step.after])), high = Math.max(1e-9, ...steps.flatMap(step => [step.before, step.after]));
-  const X = value => left + (right - left) * (value - low) / (high - low || 1);
-  steps.forEach((step, index) => {
-    const y = index * line, from = Math.min(step.before, step.after), to = Math.max(step.before, step.after);
-    const names = {drive: "late: drive", wait: "late: wait", job: "late: job"};
-    svg.append(text(0, y + 16, names[step.name] || step.name, {class: "strong"}));
-    svg.append(make("rect", {x: X(from), y: y + 4, width: Math.max(1, X(to) - X(from)), height: line - 9, fill: step.sum ? INK : shades[step.name] || RED}));
-    if (index + 1 < steps.length) svg.append(make("path", {d: `M${X(step.after)} ${y + line - 5}v9`, stroke: SOFT}));
-    svg.append(text(width, y + 16, step.sum ? number(step.after) : step.before - step.after < .005 ? "0" : `−${number(step.before - step.after)}`, {"text-anchor": "end", class: step.sum ? "strong" : ""}));
-  });
-}
-function drawFrames() {
-  const it = run(), height = 112, [svg, width] = picture("frames", height, "Loss of each frame");
-  const kinds = ["drive", "wait", "energy"], shades = fills(svg, kinds), top = 16;
-  // Where net value was foreseen: how it fell (▼, down, red) or rose over each frame; else what was used up.
-  const foreseen = it.frames.every(each => each.fell !== null), falls = it.frames.map(each => each.fell);
-  const sizes = foreseen ? falls : it.frames.map(each => each.lost.reduce((a, b) => a + b));
-  const rise = foreseen ? Math.max(0, ...falls.map(fall => -fall)) : 0, fall = Math.max(0, ...sizes), room = height - 36;
-  const unit = room / (rise + fall || 1), most = fall || 1e-9;
-  const bottom = foreseen ? top / 4 + rise * unit : height - 20;
-  const step = width / it.frames.length, worst = it.worst.slice(0, 3).filter(index => sizes[index] > 0);
-  const base = make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK});
-  it.frames.forEach((each, index) => {
-    let up = bottom;
-    const group = make("g");
-    if (index === at) group.append(make("rect", {x: index * step, y: 0, width: step, height: height - 20, fill: "#fbe9c6"}));
-    else group.append(make("rect", {x: index * step, y: 0, width: step, height: height - 20, fill: "transparent"}));
-    if (foreseen) {
-      const down = each.fell > 0, tall = Math.abs(each.fell) * unit;
-      group.append(make("rect", {x: index * step + step * .14, y: down ? bottom : bottom - tall, width: Math.max(1, step * .72), height: tall, fill: down ? RED : "#fff", stroke: down ? RED : "#0072b2"}));
-    } else each.lost.forEach((part, kind) => {
-      const tall = Math.max(0, (bottom - top) * part / most);
-      up -= tall;
-      group.append(make("rect", {x: index * step + step * .12, y: up, width: Math.max(1, step * .76), height: tall, fill: shades[kinds[kind]]}));
-    });
-    if (worst.includes(index)) group.append(text((index + .5) * step, foreseen ? Math.min(height - 22, bottom + Math.max(0, each.fell) * unit + 13) : up - 4, index, {"text-anchor": "middle", class: "strong"}));
-    svg.append(pressable(group, each.here_lost, () => go(index)));
-  });
-  svg.append(base, text(0, height - 4, foreseen ? "net value foreseen: ■ lost, □ won in each frame" : "used up, frame by frame"));
-}
-function drawSeen() {
-  const points = run().compared;
-  if (!points.length) { $("seen").replaceChildren(); return; }
-  const height = 190, [svg, width] = picture("seen", height, "Advertised and seen quality by frame");
-  const left = 30, right = width - 8, top = 24, bottom = height - 32;
-  const last = Math.max(1, run().frames.length - 1), X = index => left + 9 + (right - left - 9) * index / last, Y = value => bottom - (bottom - top) * value;
-  for (const mark of [0, .5, 1]) svg.append(make("path", {d: `M${left} ${Y(mark)}H${right}`, stroke: RULE}), text(left - 6, Y(mark) + 4, number(mark).replace("0.00", "0").replace("1.00", "1"), {"text-anchor": "end"}));
-  const clip = value => Math.min(1, Math.max(0, value));
-  const over = points.map(([index, level]) => `${X(index)},${Y(clip(level + data.band))}`), under = points.map(([index, level]) => `${X(index)},${Y(clip(level - data.band))}`).reverse();
-  svg.append(make("polygon", {points: [...over, ...under].join(" "), fill: "#dbe9f1"}));
-  svg.append(make("polyline", {points: points.map(([index, level]) => `${X(index)},${Y(level)}`).join(" "), fill: "none", stroke: "#0072b2", "stroke-width": 1.6}));
-  for (const [index, level, seen] of points) {
-    const off = Math.abs(seen - level) > data.band, x = X(index), y = Y(clip(seen));
-    const mark = off ? make("path", {d: `M${x - 3.5} ${y - 3.5}l7 7m0 -7l-7 7`, stroke: RED, "stroke-width": 2}) : make("circle", {cx: x, cy: y, r: 3.2, fill: INK});
-    if (index === at) svg.append(make("circle", {cx: x, cy: y, r: 8, fill: "none", stroke: RED}));
-    svg.append(pressable(mark, `frame ${index}: advertised ${number(level)}, seen ${number(seen)}${off ? ", off the band" : ""}`, () => go(index)));
-  }
-  svg.append(text(0, 11, "quality: line advertised, ● seen, × off the band"), text(right, height - 4, "frame", {"text-anchor": "end"}));
-  const [marks] = ticks(0, last, 5);
-  for (const mark of marks) if (Number.isInteger(mark)) svg.append(text(X(mark), bottom + 16, mark, {"text-anchor": "middle"}));
-}
-function drawRivals() {
-  if (data.runs.length < 2) { $("rivals").replaceChildren(); return; }
-  const line = 27, [svg, width] = picture("rivals", data.runs.length * line + 4, "Net value of each policy");
-  const nets = data.runs.map(each => each.net ?? 0), low = Math.min(0, ...nets), high = Math.max(1e-9, ...nets), left = 82, right = width - 58;
-  const X = value => left + (right - left) * (value - low) / (high - low || 1);
-  data.runs.forEach((each, index) => {
-    const y = index * line, net = each.net ?? 0, group = make("g");
-    group.append(text(0, y + 17, each.name, {class: index === tab ? "strong" : ""}),
-      make("rect", {x: X(Math.min(0, net)), y: y + 5, width: Math.max(1, Math.abs(X(net) - X(0))), height: line - 11, fill: index === tab ? INK : "#b9b3a6"}),
-      text(width, y + 17, number(net), {"text-anchor": "end", class: index === tab ? "strong" : ""}));
-    svg.append(pressable(group, `${each.name}: ${each.state}`, () => show(index)));
-  });
-}
-
-// ---- what is shown
 function write(id, content) { $(id).textContent = content || ""; }
 function draw() {
   const it = run(), now = frame();
@@ -379,7 +22,8 @@ function draw() {
   write("where", `Frame ${at}, ${it.frames.length} in all · ${now.started.toFixed(2)} s – ${now.ended.toFixed(2)} s${again}${sort}`);
   write("sentence", one.headline); write("why", one.why); write("fixed", one.fixed); write("price", one.price);
   write("here", now.here_lost); write("here-seen", now.here_seen);
-  drawMap(); drawCurve(); drawShares(); drawLanes(); drawWaterfall(); drawFrames(); drawSeen(); drawRivals();
+  write("switching", it.switching);
+  drawLegend(); drawMap(); drawObjective(); drawCurve(); drawShares(); drawLanes(); drawWaterfall(); drawFrames(); drawSeen(); drawRivals();
 }
 function drawTabs() {
   if (data.runs.length < 2) return;
@@ -402,7 +46,7 @@ function go(index, order = 0) {
 }
 function show(index) {
   tab = index;
-  go(live ? run().frames.length - 1 : run().worst[0] ?? 0);
+  go(live ? run().frames.length - 1 : run().opens ?? run().worst[0] ?? 0);
 }
 function nextDecision() {
   if (moment + 1 < frame().moments.length) go(at, moment + 1);
@@ -412,6 +56,11 @@ function nextLoss() {
   const order = run().worst;
   go(order[(order.indexOf(at) + 1) % order.length]);
 }
+const switches = () => run().frames.flatMap((each, index) => each.motion?.comparisons.some(one => one.taken) ? [index] : []);
+function nextSwitch() {
+  const order = switches();
+  if (order.length) go(order.find(index => index > at) ?? order[0]);
+}
 function follow() {
   const link = decodeURIComponent(location.hash.slice(1)).match(/^(?:(.*):)?(\d+)$/);
   const named = link && link[1] ? data.runs.findIndex(each => each.name === link[1]) : 0;
@@ -419,17 +68,17 @@ function follow() {
   if (link && Number(link[2]) < run().frames.length) go(Number(link[2]));
   else show(tab);
 }
-const acts = {ArrowLeft: () => go(at - 1), ArrowRight: () => go(at + 1), d: nextDecision, l: nextLoss};
+const acts = {ArrowLeft: () => go(at - 1), ArrowRight: () => go(at + 1), d: nextDecision, l: nextLoss, s: nextSwitch};
 addEventListener("keydown", event => {
   if (!acts[event.key] || event.ctrlKey || event.metaKey || event.altKey || !frame()) return;
   event.preventDefault();
   acts[event.key]();
 });
-[["back", "ArrowLeft"], ["on", "ArrowRight"], ["decision", "d"], ["loss", "l"]].forEach(([id, key]) => $(id).addEventListener("click", () => frame() && acts[key]()));
+[["back", "ArrowLeft"], ["on", "ArrowRight"], ["decision", "d"], ["loss", "l"], ["switch", "s"]].forEach(([id, key]) => $(id).addEventListener("click", () => frame() && acts[key]()));
 addEventListener("hashchange", follow);
 let width = innerWidth;
 addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; draw(); } });
-if (data.runs.length) { drawLegend(); follow(); }
+if (data.runs.length) follow();
 if (live) {
   new EventSource("events").onmessage = async () => {
     const newest = at >= run().frames.length - 1;
@@ -438,4 +87,3 @@ if (live) {
     if (newest) go(run().frames.length - 1); else draw();
   };
 }
-})();

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command, folder, natural, positive, progress
+from anytime.command_line import Answer, add_command, folder, natural, positive, progress, target
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -26,6 +26,9 @@ def declare(commands: Any) -> None:
     parser.add_argument("--policy", default="expected", help="expected, paper, fixed, min or max")
     parser.add_argument(
         "--robot", default="simulated", metavar="WHERE", help="a NAO: simulated or naoqi:tcp://…"
+    )
+    parser.add_argument(
+        "--drift", type=target, metavar="FILE", help="what a NAO learns of itself, from run to run"
     )
     parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
     parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
@@ -66,6 +69,8 @@ def run(options: argparse.Namespace) -> Answer:
         return _run_nao(options)
     if options.robot != "simulated":
         raise AnytimeError(f"--robot {options.robot} is for a NAO's scene, not for a grid mission")
+    if options.drift:
+        raise AnytimeError(f"--drift {options.drift} is for a NAO's scene, not for a grid mission")
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
     start, goal = options.start, options.goal
@@ -104,19 +109,23 @@ def _run_nao(options: argparse.Namespace) -> Answer:
     from monitor.logs import read_log
     from monitor.page import write_page
     from monitor.robots.nao_addresses import nao_body
+    from monitor.robots.nao_drift import read_drift, write_drift
     from monitor.robots.nao_missions import brief
     from monitor.robots.nao_scenes import read_scene
 
     scene = read_scene(options.mission, seed=options.seed)
+    drift = read_drift(options.drift) if options.drift else None
     with progress("measuring listening and planning"):
         briefing = brief()
     here = options.robot == "simulated" and options.clock == "work"
     clock = None if here else WallClock()
     body = None if here else nao_body(options.robot, scene, clock)
-    robot = briefing.robot(scene, body=body, clock=clock)
+    robot = briefing.robot(scene, body=body, clock=clock, drift=drift)
     log = options.log / "mission.jsonl"
     report = briefing.log(robot, scene, log)
     robot.body.close()
+    if options.drift:
+        write_drift(options.drift, robot.drift)
     page = write_page([read_log(log)], options.log / "mission.html")
     told = (
         f"{robot.apart():.3f} m from the goal by odometry, {robot.plans} plans, {robot.falls} falls"
@@ -131,6 +140,7 @@ def _run_nao(options: argparse.Namespace) -> Answer:
             "final_error_m": robot.apart(),
             "plans": robot.plans,
             "falls": robot.falls,
+            "drift_rad": robot.drift.mean,
             "log": str(log),
             "page": str(page),
         },

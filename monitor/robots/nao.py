@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import Any
 
 from anytime.clocks import Clock
 from monitor.endings import Ending
 from monitor.missions import Energy
-from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
+from monitor.robots.nao_body import LYING, LinkLostError, NaoBody, Outcome, Reading
 from monitor.robots.nao_drift import Drift
+from monitor.robots.nao_execution import Execution, command, leads
 from monitor.robots.nao_hearing import Hearing
+from monitor.robots.nao_odometry import FROZEN, Odometry
 from monitor.robots.nao_planning import Errand, new_query
 from monitor.robots.nao_scenes import Goal
+from monitor.robots.nao_story import Story
 from monitor.states import Situation
 from planners import nao_plan
 from planners.nao import POSTURES, STAND, STANDING, Body
@@ -24,7 +26,6 @@ from planners.nao_plan import (
     actions_of,
     made_before,
     plan_world,
-    trajectory,
 )
 from planners.query import Solution
 from sensing.sonar import Sonars
@@ -50,32 +51,12 @@ class Manner:
     plans: int | None = None
 
 
-@dataclass
-class _Execution:
-    """A plan in execution, action by action.
-
-    done: actions that are complete. began: when the one that goes on began, of whatever plan it
-    was then. heading: of the robot then. rises: whether it stands up.
-    """
-
-    solution: Solution
-    actions: tuple[nao_plan.Action, ...]
-    done: int = 0
-    began: float = 0.0
-    running: Action | None = None
-    heading: float = 0.0
-    rises: bool = False
-
-    @property
-    def current(self) -> nao_plan.Action | None:
-        return self.actions[self.done] if self.done < len(self.actions) else None
-
-
 _DANGER = 0.2  # metres by which a plan is worse that leads into something
 _TOUCHED_RADIUS = 0.1  # metres, of something that it fell over
 _TOUCHED_FOR = 45.0  # seconds for which that is believed to be there
 _WORTH = 0.01  # metres by which a plan must be better than to do nothing
 _FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
+_TRIES = 3  # walks that odometry does not see, one after the other, before the body is lost
 
 NOTHING = {("more", 0): False}
 """The plan to do nothing."""
@@ -107,20 +88,20 @@ class NaoRobot:
         self.falls = 0
         self.plans = 0
         self.switches = 0
-        self.reading = body.read()
+        self.odometry = Odometry(self.figures.speed, self.figures.turn_rate)
+        self.reading = self.read()
         self._energy_model = energy
         self._energy = self._driven = 0.0
         self._since = self._presented = clock.now()
         self._hopeful = self._since  # when a plan last brought it nearer
-        self._execution: _Execution | None = None
+        self._execution: Execution | None = None
         self._posture = "Crouch"  # the last one that had a name
         self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
         self.hearing = Hearing(self, sonars or Sonars())
         self.query = new_query(self._world(self.hearing.known), seed)
-        self._interrupted = False
+        self._tries = 0  # walks broken off since the pose last changed
         self._ending: Ending | None = None
-        self._track: list[tuple[float, float, float]] = [self.reading.pose_in_world]
-        self._objective: list[tuple[float, float]] = []
+        self._story = Story(self.reading.pose_in_world)
 
     # --- A body that is looked after: whoever lets its time pass moves the plan on.
 
@@ -137,7 +118,15 @@ class NaoRobot:
             left -= part
 
     def read(self) -> Reading:
-        return self.body.read()
+        """What the body tells, its pose as far as it can be believed. Raises LinkLostError.
+
+        Over NAOqi the driver has looked at the pose already, and nothing is found here.
+        """
+        reading, jumps = self.body.read(), self.odometry.jumps
+        pose = self.odometry.believe(reading.time, reading.pose_in_world, reading.moving)
+        if self.odometry.jumps > jumps:
+            self._story.happened(self._elapsed(), "odometry jumped")
+        return replace(reading, pose_in_world=pose)
 
     # --- What the monitor asks for.
 
@@ -157,24 +146,43 @@ class NaoRobot:
         self.attend()
         if self._ending is not None or self.plans == self.manner.plans:
             return
-        execution = self._execution
-        if execution is not None:  # it may come a little nearer to obstacles than a new one
-            self.query.world.update(self._world(self.hearing.known, 0.4 * self.manner.margin))
-            value_now = self.query.value_of(execution.solution.choices)
-        self.query.world.update(self._world(self.hearing.known))
-        value = self.query.value_of(plan.choices)
-        if execution is not None:
-            self._objective.append((self.clock.now(), value_now))
-            # Who begins anew before the feet have moved never moves: then only danger counts.
-            young = self.clock.now() - execution.began < self.figures.step_phase
-            if value >= value_now - (_DANGER if young else self.manner.threshold):
-                return
-            self.switches += 1
-        elif value >= self.query.value_of(NOTHING) - _WORTH:
+        if not self._better(plan):
             return
+        self.switches += self._execution is not None
         self._hopeful = self.clock.now()
         self.plans += 1
         self._start(plan)
+
+    def _better(self, plan: Solution) -> bool:
+        """Whether a plan is better by the threshold than the one in execution, or than nothing."""
+        execution = self._execution
+        held, threshold = 0.0, _WORTH
+        if execution is not None:  # it may come a little nearer to obstacles than a new one
+            self.query.world.update(self._world(self.hearing.known, 0.4 * self.manner.margin))
+            held = self.query.value_of(execution.solution.choices)
+            # Who begins anew before the feet have moved never moves: then only danger counts.
+            young = self.clock.now() - execution.began < self.figures.step_phase
+            threshold = _DANGER if young else self.manner.threshold
+        world = self._world(self.hearing.known)
+        self.query.world.update(world)
+        if execution is None:
+            held = self.query.value_of(NOTHING)
+        found = self.query.value_of(plan.choices)
+        better = found < held - threshold
+        actions = actions_of(plan.choices)
+        current = execution.actions if execution else ()
+        kept, other = (actions, current) if better else (current, actions)
+        self._story.compared(
+            self._elapsed(),
+            held,
+            found,
+            threshold=threshold,
+            idle=execution is None,
+            taken=better,
+            plan=leads(kept, world) if kept else (),
+            other=leads(other, world) if other and other != kept else (),
+        )
+        return better
 
     def change_speed(self, speed: float) -> None:
         """A NAO walks at its own speed."""
@@ -198,25 +206,19 @@ class NaoRobot:
         return self._driven
 
     def story(self) -> Mapping[str, Any]:
-        """Of the frame just ended: poses [m, 3] by odometry, the objective of the plan in execution
-        over time [k, 2], where the plan leads [n, 2], discs believed [o, 3], sonars, falls."""
-        track, self._track = self._track, self._track[-1:]
-        objective, self._objective = self._objective, []
-        world = dict(self.query.world)
-        count = world["obstacle_count"]
-        led = trajectory(self._execution.actions, world) if self._execution else ()
-        return {
-            "path": [list(pose) for pose in track],
-            "objective": [list(pair) for pair in objective],
-            "plan": [[pose.x, pose.y] for pose in led],
-            "planned": 0.0,
-            "length": sum(math.dist(a[:2], b[:2]) for a, b in pairwise(track)),
-            "obstacles": [list(map(float, disc)) for disc in world["obstacles"][:count]],
-            "sonars": [None if math.isnan(s) else min(s, 9.99) for s in self.reading.sonars],
-            "posture": self.reading.posture,
-            "switches": self.switches,
-            "falls": self.falls,
-        }
+        """Of the frame just ended; see `monitor.robots.nao_story`."""
+        world = self._world(self.hearing.known)
+        clearance = self.figures.radius + self.manner.margin
+        grown = world["obstacles"][: world["obstacle_count"]].tolist()
+        return self._story.told(
+            self.reading,
+            executes=self._execution is not None,
+            goal=self.goal.place(self._elapsed()),
+            discs=[(x, y, r - clearance) for x, y, r in grown],
+            clearance=clearance,
+            radius=self.figures.radius,
+            sonars=self.hearing.sonars,
+        )
 
     def picture(self) -> Mapping[str, Any]:
         """What was heard."""
@@ -229,7 +231,7 @@ class NaoRobot:
         now = self.clock.now()
         passed, self._since = now - self._since, now
         try:
-            before, self.reading = self.reading, self.body.read()
+            before, self.reading = self.reading, self.read()
         except LinkLostError:
             self._ending = self._ending or Ending.LINK_LOST
             self._execution = None
@@ -238,8 +240,9 @@ class NaoRobot:
         power = float(self._energy_model.power(self.figures.speed))
         self._energy += passed * (power if moving else self._energy_model.idle)
         self._driven += passed * moving
-        if math.dist(self.reading.pose_in_world[:2], self._track[-1][:2]) > 0.01:
-            self._track.append(self.reading.pose_in_world)
+        if self.odometry.unseen == 0.0:
+            self._tries = 0
+        self._story.moved(self.reading.pose_in_world)
         if self.reading.fallen and not before.fallen:
             self._fell()
         elif self._execution is not None:
@@ -266,6 +269,7 @@ class NaoRobot:
 
     def _fell(self) -> None:
         self.falls += 1
+        self._story.happened(self._elapsed(), "fell")
         action = self._execution.current if self._execution else None
         if action is not None and action.name == "walk":
             self._touched.append((*self._ahead(action), self.clock.now() + _TOUCHED_FOR))
@@ -284,7 +288,7 @@ class NaoRobot:
         """Execute a plan from the current moment on: what is executed is skipped, the action that
         goes on in part."""
         before = self._execution
-        made = _Execution(plan, actions_of(plan.choices))
+        made = Execution(plan, actions_of(plan.choices))
         if before is not None:
             made.done = before.done
             if made.current == before.current:  # nothing changes before its end
@@ -293,9 +297,9 @@ class NaoRobot:
         self._execution = made
         self._go_on(made)
 
-    def _go_on(self, execution: _Execution) -> None:
+    def _go_on(self, execution: Execution) -> None:
         """Begin the next action when one has ended."""
-        while execution.running is None or (outcome := execution.running.poll()) is not None:
+        while execution.running is None or (outcome := self._outcome(execution)) is not None:
             if execution.running is not None:
                 if outcome not in (Outcome.DONE, Outcome.REFUSED):
                     self._drop()
@@ -314,7 +318,17 @@ class NaoRobot:
             execution.began = self.clock.now()
             execution.heading = self.reading.pose_in_world[2]
             execution.rises = self._rises(action)
-            execution.running = self._command(action)
+            execution.running = command(self.body, self.clock, action)
+
+    def _outcome(self, execution: Execution) -> Outcome | None:
+        """How the action in execution ended, if it did. A walk that odometry does not see is broken
+        off: nobody knows where it leads."""
+        assert execution.running is not None
+        if self.odometry.unseen > FROZEN * (self._tries + 1):
+            self._tries += 1
+            self.body.stop()
+            return Outcome.LINK_LOST if self._tries == _TRIES else Outcome.TIMEOUT
+        return execution.running.poll()
 
     def _drop(self) -> None:
         """No plan is in execution any more."""
@@ -327,15 +341,6 @@ class NaoRobot:
             and int(action.ahead) in STANDING
             and self.reading.posture not in {POSTURES[posture] for posture in STANDING}
         )
-
-    def _command(self, action: nao_plan.Action) -> Action:
-        if action.name == "walk":
-            return self.body.walk(action.ahead, action.left, 0.0)
-        if action.name == "turn":
-            return self.body.walk(0.0, 0.0, action.ahead)
-        if action.name == "posture":
-            return self.body.posture(POSTURES[int(action.ahead)])
-        return _Pause(self.clock, action.ahead)
 
     # --- What plans are simulated in.
 
@@ -368,7 +373,7 @@ class NaoRobot:
 
     def _meeting_point(self) -> tuple[float, float]:
         """Where the goal will be when the robot can be there."""
-        elapsed = self.clock.now() - self._presented
+        elapsed = self._elapsed()
         if self.goal.velocity == (0.0, 0.0):
             return self.goal.place(elapsed)
         here, body = self.reading.pose_in_world[:2], self.figures
@@ -381,19 +386,8 @@ class NaoRobot:
 
     def apart(self) -> float:
         """Metres to the goal, by odometry."""
-        goal = self.goal.place(self.clock.now() - self._presented)
-        return math.dist(self.reading.pose_in_world[:2], goal)
+        return math.dist(self.reading.pose_in_world[:2], self.goal.place(self._elapsed()))
 
-
-class _Pause:
-    """Waiting, as an action."""
-
-    def __init__(self, clock: Clock, seconds: float) -> None:
-        self._clock = clock
-        self._until = clock.now() + seconds
-
-    def poll(self) -> Outcome | None:
-        return Outcome.DONE if self._clock.now() >= self._until - 1e-9 else None
-
-    def cancel(self) -> None:
-        self._until = self._clock.now()
+    def _elapsed(self) -> float:
+        """Seconds since the task was presented."""
+        return self.clock.now() - self._presented

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from anytime.errors import AnytimeError
+from anytime.files import Stored, read_record, write_record
+
+SCHEMA = "anytime.drift/1"
 
 
 @dataclass(frozen=True)
@@ -24,3 +30,29 @@ class Drift:
             mean=self.mean + gain * (turned - self.mean),
             variance=(1.0 - gain) * self.variance,
         )
+
+
+class _Record(Stored):
+    """A `Drift` in a file."""
+
+    mean: float
+    variance: float
+    noise: float
+
+
+def read_drift(path: Path) -> Drift:
+    """What earlier runs taught, or what is believed before any run if there is no such file.
+
+    Raises AnytimeError, in one line with the path, for a file that is none of ours.
+    """
+    if not path.exists():
+        return Drift()
+    told = read_record(path, SCHEMA, _Record)
+    if not (told.variance > 0.0 and told.noise > 0.0):
+        raise AnytimeError(f"{path}: variance and noise must be > 0")
+    return Drift(told.mean, told.variance, told.noise)
+
+
+def write_drift(path: Path, drift: Drift) -> None:
+    """Keep what was learnt for the next run; the file is whole or as it was."""
+    write_record(path, SCHEMA, _Record(**asdict(drift)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from monitor.logs import Floor
 from monitor.reports import Frame
 from monitor.robots.nao_scenes import Scene
-from sensing.sonar_map import SonarMap
+from sensing.sonar_grid import PRIOR, SonarMap
 
 RESOLUTION = 0.05
 """Metres a cell."""
@@ -37,20 +37,57 @@ class ScenePlan:
         return min(rows - 1, max(0, int(row))), min(columns - 1, max(0, int(column)))
 
     def drawn(self, frame: Frame) -> Frame:
-        """A frame of a NAO with its places as cells, as the log draws them."""
+        """A frame of a NAO with its places in cells, as the log draws them."""
         story: dict[str, Any] = dict(frame.story)
-        story["path"] = self._cells(story["path"])
-        story["plan"] = [[*cell, 0] for cell in self._cells(story["plan"])]
+        story["motion"] = self._motion(story["motion"])
         if isinstance(story.get("belief"), SonarMap):
-            story["belief"] = self._believed(story["belief"])
+            story["belief"] = self.believed(story["belief"])
         return replace(frame, story=story)
 
-    def _cells(self, places: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
-        cells = [self.cell(place[0], place[1]) for place in places]
-        return cells[:1] + [after for before, after in pairwise(cells) if after != before]
+    def _motion(self, told: Mapping[str, Any]) -> dict[str, Any]:
+        """What `nao_story` tells in metres, in cells: see `monitor.log_lines.Motion`."""
+        return {
+            "track": [[*self._at(x, y), round(heading, 3)] for x, y, heading in told["track"]],
+            "radius": _cells(told["radius"]),
+            "plan": self._way(told["plan"]),
+            "goal": self._at(*told["goal"]),
+            "discs": [[*self._at(x, y), _cells(radius)] for x, y, radius in told["discs"]],
+            "clearance": _cells(told["clearance"]),
+            "cones": [self._cone(cone) for cone in told["cones"]],
+            "comparisons": [
+                {**comparison, "other": self._way(comparison["other"])}
+                for comparison in told["comparisons"]
+            ],
+            "events": told["events"],
+        }
 
-    def _believed(self, heard: SonarMap) -> NDArray[np.float64]:
-        """What was heard, on the cells of the floor; 0.2 where nothing is known."""
+    def _cone(self, cone: Mapping[str, Any]) -> dict[str, Any]:
+        row, column = self._at(cone["x"], cone["y"])
+        heard = cone["heard"]
+        return {
+            "row": row,
+            "column": column,
+            "bearing": round(math.remainder(cone["bearing"], math.tau), 3),
+            "half_angle": round(cone["half_angle"], 3),
+            "reach": _cells(cone["reach"]),
+            "heard": None if heard is None else _cells(heard),
+        }
+
+    def _at(self, x: float, y: float) -> list[float]:
+        """A place as (row, column) with fractions."""
+        return [_cells(self.top - y), _cells(x - self.left)]
+
+    def _way(self, places: Sequence[Sequence[float]]) -> list[list[float]]:
+        """A way without the stops on it."""
+        ways = [self._at(x, y) for x, y in places]
+        return ways[:1] + [after for before, after in pairwise(ways) if after != before]
+
+    def believed(self, heard: SonarMap) -> NDArray[np.float64]:
+        """What was heard, on the cells of the floor, with its density where nothing is known.
+
+        A sonar map begins as good as free; so that the page can tell what was heard to be free from
+        what was not heard, the density falls with the evidence for that.
+        """
         shape = self.floor.free.shape
         believed = np.full(shape, self.floor.density)
         xs, ys = heard.places()
@@ -59,8 +96,16 @@ class ScenePlan:
         inside = np.ix_((rows >= 0) & (rows < shape[0]), (columns >= 0) & (columns < shape[1]))
         good_rows = rows[(rows >= 0) & (rows < shape[0])]
         good_columns = columns[(columns >= 0) & (columns < shape[1])]
-        believed[np.ix_(good_rows, good_columns)] = heard.probabilities()[inside]
+        sure = heard.probabilities()[inside].astype(float)
+        cleared = self.floor.density * sure / PRIOR
+        blocked = self.floor.density + (1.0 - self.floor.density) * (sure - PRIOR) / (1.0 - PRIOR)
+        believed[np.ix_(good_rows, good_columns)] = np.where(sure < PRIOR, cleared, blocked)
         return believed
+
+
+def _cells(metres: float) -> float:
+    """A length in cells, to half a millimetre."""
+    return round(metres / RESOLUTION, 2)
 
 
 def plan_of(scene: Scene) -> ScenePlan:

@@ -6,41 +6,57 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from monitor.robots.nao_body import Pose
+from monitor.robots.nao_body import LinkLostError, Pose
 
 _SLACK = 3.0  # times its speed that a robot may seem to move
 _PLACE, _HEADING = 0.05, 0.3  # metres and radians that it may seem to move in no time
+_BLIND = 1.0  # seconds that the last pose stands for what is none
+
+FROZEN = 3.0
+"""Seconds of walking that are not seen after which nobody knows where the robot goes."""
 
 
 class Odometry:
     """A robot's pose without jumps, in the frame in which it was first told.
 
     Who falls, is carried away or starts anew, tells a pose that cannot follow from the one before.
-    Then the frame is laid anew so that the robot is where it last was: all that was planned there
-    stays right but for the few steps that nobody saw. jumps: how often that happened.
+    Then the frame is laid anew so that the robot is where it last was: goal, obstacles and plans
+    stay where they are but for the few steps that nobody saw. What a robot walks while its pose
+    stays the same is no jump when it is told at last. jumps: how often there was one. unseen:
+    seconds that it said to move since the pose was last another one.
     """
 
     def __init__(self, speed: float, turn_rate: float) -> None:
         self.jumps = 0
-        self.changed = -math.inf  # when it last told another pose
+        self.unseen = 0.0
         self._speed, self._turn_rate = speed, turn_rate
         self._anchor: Pose | None = None  # the robot's frame in ours; None if it is ours
         self._raw: Pose | None = None
-        self._time = 0.0
+        self._time = -math.inf  # when the pose last was one
+        self._moving = False  # whether the robot said so then
         self._pose: Pose | None = None
 
-    def believe(self, time: float, told: Sequence[Any]) -> Pose | None:
-        """The pose at a time, from what the robot told; None if that is no pose."""
-        raw = _pose(told)
+    def believe(self, time: float, told: Sequence[Any], moving: bool) -> Pose:
+        """The pose at a time, from what the robot told, and whether it said that it moves.
+
+        What is no pose is passed over for a second; the last one stands. Raises LinkLostError
+        after that, and when there was none before.
+        """
+        raw, before = _pose(told), self._raw
         if raw is None:
-            return None
-        if raw != self._raw:
-            self.changed = time
-        if self._raw is not None and self._leaps(self._raw, raw, time - self._time):
+            if self._pose is None or time - self._time > _BLIND:
+                raise LinkLostError(f"the robot does not tell where it is; it says {told!r}")
+            return self._pose
+        passed = time - self._time
+        if before is not None and self._leaps(before, raw, passed + self.unseen):
             assert self._pose is not None
             self.jumps += 1
             self._anchor = compose(self._pose, inverse(raw))
-        self._raw, self._time = raw, time
+        if raw != before:
+            self.unseen = 0.0
+        elif moving and self._moving:
+            self.unseen += passed
+        self._raw, self._time, self._moving = raw, time, moving
         self._pose = raw if self._anchor is None else compose(self._anchor, raw)
         return self._pose
 

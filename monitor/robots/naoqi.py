@@ -11,7 +11,7 @@ from anytime.errors import AnytimeError
 from anytime.machines import Machine
 from monitor.robots.nao_body import LinkLostError, Outcome, Pose, Reading
 from monitor.robots.nao_clocks import PacedClock
-from monitor.robots.nao_odometry import Odometry
+from monitor.robots.nao_odometry import FROZEN, Odometry
 from monitor.robots.naoqi_actions import Call, NaoqiAction, Piece, Way
 from monitor.robots.naoqi_link import Link, RemoteError
 from monitor.robots.naoqi_lockstep import Lockstep
@@ -20,7 +20,6 @@ from planners.nao import POSTURES, STANDING, Body
 
 _FARTHEST = 100.0  # metres or radians that one walk may go
 _PROBING = 0.05  # seconds of real time between two looks at a robot that does something
-_FROZEN = 3.0  # seconds without a change of the pose after which who walks does not
 _NEAR = 0.05  # metres of a walk that are not worth a piece of their own
 _NAME = "anytime"  # of us, as a subscriber
 _STOPPING = ("ALMotion", "ALRobotPosture")
@@ -186,7 +185,7 @@ class NaoqiBody:
     def _decide(self, action: NaoqiAction, look: Look, at: float, over: bool) -> None:
         """Go on with an action, or end it. over: whether its call has been answered."""
         action.rising = action.rising and look.fallen
-        frozen = at - max(self.odometry.changed, action.called) > _FROZEN
+        frozen = self.odometry.unseen - action.unseen > FROZEN
         if look.fallen and not action.rising:
             self._end(Outcome.FELL)
         elif at > action.deadline or (frozen and look.moving and action.way):
@@ -241,7 +240,7 @@ class NaoqiBody:
         """Make the next call of an action."""
         service, method, arguments = action.calls.pop(0)
         action.future = self.link.send(service, method, *arguments)
-        action.called, self._probe = self.now(), None
+        action.unseen, self._probe = self.odometry.unseen, None
         if self._lockstep and action.calls:
             self.link.value(action.future)
             self._call_next(action)

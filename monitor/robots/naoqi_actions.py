@@ -72,7 +72,7 @@ class NaoqiAction:
     deadline: float = math.inf
     calls: list[Call] = field(default_factory=list)  # still to be made
     future: Any = None  # of the call in execution
-    called: float = 0.0  # when it was made
+    unseen: float = 0.0  # seconds that odometry had not seen when it was made
     number: int = 0  # of it, in lock-step
     piece: Piece | None = None
 

@@ -13,8 +13,6 @@ from monitor.robots.naoqi_link import Link, RemoteError
 from monitor.robots.naoqi_names import FALLEN, NO_ECHO, SONARS
 from planners.nao import POSTURES
 
-_BLIND = 1.0  # seconds that the last pose stands for what is none
-
 
 @dataclass(frozen=True)
 class Look:
@@ -37,8 +35,6 @@ class Looks:
     def __init__(self, link: Link, odometry: Odometry) -> None:
         self._link = link
         self._odometry = odometry
-        self._pose: Pose | None = None
-        self._good = -math.inf  # when the pose last was one
 
     def ask(self) -> list[Any]:
         """Ask for everything at once: one after the other would take as many times the way."""
@@ -64,16 +60,8 @@ class Looks:
         # The key may be missing or late, and on a robot it may outlive the fall: posture counts.
         fallen = lies or (bool(fell) and posture not in POSTURES)
         sonars = _heard(left), _heard(right)
-        pose = self._believed(told, now)
+        pose = self._odometry.believe(now, told, bool(moving))
         return Look(pose, posture, fallen, bool(moving), sonars, bool(awake))
-
-    def _believed(self, told: Sequence[Any], now: float) -> Pose:
-        pose = self._odometry.believe(now, told)
-        if pose is not None:
-            self._pose, self._good = pose, now
-        if self._pose is None or now - self._good > _BLIND:
-            raise LinkLostError(f"the robot does not tell where it is; it says {told!r}")
-        return self._pose
 
 
 def _heard(value: Any) -> float:

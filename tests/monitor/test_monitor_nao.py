@@ -16,7 +16,6 @@ from monitor.missions import Energy, Mission, Value
 from monitor.monitoring import Monitor
 from monitor.policies import constant
 from monitor.robots.nao import NaoRobot
-from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_planning import errands, improve
 from monitor.robots.nao_scenes import read_scene
 from monitor.robots.simulated_nao import SimulatedNao
@@ -33,13 +32,11 @@ def program():
     return compiler.compile(improve, anytime.measure(improve, problems, seconds=0.6, clock=clock))
 
 
-def live(program, name: str, seed: int, *, drift: Drift | None = None, noise: bool = True):
+def live(program, name: str, seed: int, *, noise: bool = True):
     scene = read_scene(SCENES / f"{name}.toml", seed=seed, noise=noise)
     clock = WorkClock(MACHINE)
     body = SimulatedNao(scene, clock)
-    robot = NaoRobot(
-        body, clock, scene.goal, MISSION.energy, sonars=scene.sonars, seed=seed, drift=drift
-    )
+    robot = NaoRobot(body, clock, scene.goal, MISSION.energy, sonars=scene.sonars, seed=seed)
     monitor = Monitor(program, constant(program.allocate(0.4).shares, 0.095), "fixed")
     frames = []
     report = monitor.run(MISSION, robot, seed=seed, listen=frames.append)
@@ -55,13 +52,13 @@ def test_it_stands_up_and_goes_round_though_nothing_tells_it_to(program):
     postures = [frame.story["posture"] for frame in frames]
     assert postures[0] == "Sit"
     assert postures[-1] in ("Stand", "StandInit", "StandZero")
-    assert max(abs(y) for frame in frames for _, y, _ in frame.story["path"]) > 0.1
+    assert max(abs(y) for frame in frames for _, y, _ in frame.story["motion"]["track"]) > 0.1
 
 
 def test_a_mission_repeats_to_the_bit(program):
     runs = [live(program, "appearing", 1) for _ in range(2)]
-    tracks = [[frame.story["path"] for frame in run[3]] for run in runs]
-    assert tracks[0] == tracks[1]
+    motions = [[frame.story["motion"] for frame in run[3]] for run in runs]
+    assert motions[0] == motions[1]
     assert runs[0][0].seconds == runs[1][0].seconds
 
 
@@ -70,16 +67,6 @@ def test_after_a_fall_it_stands_up_and_goes_on(program):
     assert body.falls >= 1
     assert robot.falls == body.falls
     assert report.ending is Ending.REACHED
-
-
-def test_the_drift_of_standing_up_is_learnt(program):
-    _, robot, _, _ = live(program, "sitting", 1)
-    assert robot.drift.mean == pytest.approx(0.13, abs=0.07)
-    assert robot.drift.variance < Drift().variance
-    believed = Drift()
-    for turned in (0.12, 0.14, 0.13):
-        believed = believed.learn(turned)
-    assert believed.mean == pytest.approx(0.13, abs=0.01)
 
 
 def test_without_noise_it_arrives_where_it_believes_to_be(program):

@@ -24,7 +24,7 @@ from monitor.robots.nao_addresses import nao_body
 from monitor.robots.nao_body import LYING, LinkLostError, NaoBody, Outcome
 from monitor.robots.nao_faults import KINDS, Fault, Faulty, read_fault
 from monitor.robots.nao_noise import NOISELESS
-from monitor.robots.nao_odometry import Odometry, compose, inverse
+from monitor.robots.nao_odometry import compose, inverse
 from monitor.robots.nao_recording import Recorder, Replay
 from monitor.robots.nao_scenes import Scene, read_scene
 from monitor.robots.nao_world import Obstacle
@@ -278,43 +278,7 @@ def test_a_password_comes_from_the_environment_and_goes_into_the_handshake_alone
         password()
 
 
-# Odometry
-
-
-def test_who_walks_and_turns_at_its_speed_is_believed_to_the_bit():
-    nao, odometry = SimulatedNao(Scene(posture="Stand", seed=2)), Odometry(0.095, 0.42)
-    for command, *way in (("walk", 1.0, 0.2, 3.0), ("posture", "Sit"), ("posture", "Stand")):
-        action = getattr(nao, command)(*way)
-        while action.poll() is None:
-            nao.wait(0.1)
-            told = nao.read()
-            assert odometry.believe(told.time, told.pose_in_world) == told.pose_in_world
-    assert odometry.jumps == 0
-
-
 pose = st.tuples(st.floats(-5, 5), st.floats(-5, 5), st.floats(-3, 3))
-
-
-@given(pose, pose, pose)
-def test_a_jump_leaves_the_robot_where_it_was_and_what_follows_counts_from_there(first, second, by):
-    odometry = Odometry(0.095, 0.42)
-    odometry.believe(0.0, first)
-    at_jump = odometry.believe(0.1, second)
-    assert at_jump is not None
-    if odometry.jumps:
-        assert at_jump == pytest.approx(first, abs=1e-9)
-    step = (0.01 * math.tanh(by[0]), 0.01 * math.tanh(by[1]), 0.01)
-    after = odometry.believe(0.2, compose(second, step))
-    assert after is not None
-    assert after[:2] == pytest.approx(compose(at_jump, step)[:2], abs=1e-6)
-
-
-@pytest.mark.parametrize("bad", [None, [], [0.0, math.nan, 0.0], "abc", [1.0, 2.0], [0, 0, None]])
-def test_what_is_no_pose_is_not_believed(bad):
-    odometry = Odometry(0.095, 0.42)
-    assert odometry.believe(0.0, (1.0, 2.0, 3.0)) == (1.0, 2.0, 3.0)
-    assert odometry.believe(0.1, bad) is None
-    assert odometry.believe(0.2, (1.01, 2.0, 3.0)) == (1.01, 2.0, 3.0)
 
 
 @given(pose, st.floats(-1, 1), st.floats(-1, 1), st.floats(-6, 6))
