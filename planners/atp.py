@@ -1,11 +1,12 @@
 """ATP, the interruptible abstract planner [ZR93 §3], for maps of any kind.
 
 The paper's planner (`planners.paper_atp`) searches abstractly by obstacleness and refines segments
-between points that it has pinned. This one keeps its outline, first coarse, then ever finer where
-it is worst, and changes what fails where there are walls: abstractly it searches the graph of
-regions, whose connectivity is exact, or, on floors whose obstacles are independent of each other,
-the cells with a weight at which a search runs straight through; and it refines a whole way, in
-windows along it or a corridor around it, until the search covers the map and the way is optimal.
+between points that it has pinned; it fails where there are walls. This one keeps the outline, first
+coarse, then ever finer where it is worst. Where obstacles are walls, the coarse way leads over the
+graph of regions, whose connectivity is exact; where they are independent of each other, a weight
+that suits their density lets a search run straight through. The way in hand is then made shorter in
+windows along it or in a corridor around it, and at last by a search that proves it optimal and
+makes it shorter on the way there.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from planners.grids import Grid, endpoints
 from planners.improving import COUNT, GAIN, LOWEST, MEETING, UPPER, Run
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.path_finding import Cell
-from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT, UNLIMITED
+from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
-GRAIN = 1000
+GRAIN = 500
 """Expansions between two steps: a fraction of a millisecond."""
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
@@ -45,12 +46,11 @@ def steps(
 
     `domain` is float32 [rows, columns], the probability that a cell is blocked, or a `Grid`, which
     keeps what queries find out about the map. A cell that is blocked for certain is impassable, a
-    believed obstacle only dear. The first plan may be abstract; all others are ways from cell to
-    cell, each cheaper than the last, with `estimate` a proven bound on their quality on the map as
-    given. The last one is told once more if it took longer to prove that it is optimal. A step is
-    some `GRAIN` expansions of work; one without a plan found none better. Work is counted in nodes
-    taken from an open list, with 1/16 for every other cell or word touched and 1/256 for every cell
-    summed.
+    believed obstacle only dear. Every plan is a way from cell to cell, cheaper than the one before,
+    with `estimate` a proven bound on its quality on the map as given; the last one is told once
+    more if it took longer to prove that it is optimal. A step is some `GRAIN` expansions of work;
+    one without a plan found none better. Work is counted in nodes taken from an open list, with
+    1/16 for every other cell or word touched and 1/256 for every cell summed.
 
     Raises AnytimeError if start or goal is outside the domain or certainly blocked. A last plan
     without any cell, of infinite length, says that no way exists.
@@ -63,8 +63,6 @@ def steps(
         best, proven = math.inf, False
         for work in query.phases():
             plan = None
-            if query.abstract is not None:
-                plan, query.abstract = query.abstract, None
             if query.cost < best or (query.done and not proven and best < math.inf):
                 best, proven, plan = query.cost, query.done, query.plan()
             yield Step(work, plan)
@@ -86,8 +84,7 @@ def _borrow(shape: tuple[int, int]) -> Run:
 class _Query:
     """One query at work: the way in hand is in `run`, and costs `cost`.
 
-    least: proven lower bound of the cost of any way. abstract: an abstract plan to be told.
-    coarse: work of the search over regions.
+    least: proven lower bound of the cost of any way. coarse: work of the search over regions.
     """
 
     def __init__(self, grid: Grid, start: int, goal: int, diagonals: bool, run: Run) -> None:
@@ -100,7 +97,6 @@ class _Query:
         self.straight = int(improving.least_way(self.down, self.across, diagonals))
         self.least = self.straight
         self.cost: float = math.inf
-        self.abstract: MultiPath | None = None
         self.coarse = 0.0
         run.state[COUNT], run.state[MEETING] = 0, -1
         self._map = (grid.cost, grid.wall, columns)
@@ -206,7 +202,7 @@ class _Query:
         yield float(taken)
 
     def over_regions(self) -> Iterator[float]:
-        """A first way over the graph of regions: abstract, then from cell to cell."""
+        """A first way over the graph of regions."""
         grid, run = self.grid, _borrow_regions(self.grid.shape)
         cost, wall, columns = self._map
         soft = (cost, wall, grid.dearest, columns)
@@ -216,7 +212,7 @@ class _Query:
             while found == OUT_OF_BUDGET:
                 found, taken = blocks.search_regions(
                     *soft, self.goal, self.diagonals, _REGION_PERCENT, grid.regions, run,
-                    GRAIN * blocks.EXPANDED // 4,
+                    GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
                 work += taken
                 self.coarse += taken / blocks.EXPANDED
@@ -233,14 +229,10 @@ class _Query:
             )
         finally:
             _region_runs[grid.shape].append(run)
-        self.abstract = self._abstract(pins)
-        yield (work + touched * blocks.TOUCHED) / blocks.EXPANDED
-        count, touched = tracing.connect(
-            *soft, pins, way, grid.regions, self.diagonals, self.run.path
-        )
+        count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, self.run.path)
         self.run.state[COUNT] = count
         self._weigh()
-        yield touched * blocks.TOUCHED / blocks.EXPANDED
+        yield (work + (touched + more) * blocks.TOUCHED) / blocks.EXPANDED
 
     def windows(self, length: int) -> Iterator[float]:
         """Make the way optimal in windows of that many cells, one after the other."""
@@ -248,7 +240,7 @@ class _Query:
         state[improving.POSITION] = 0
         while not done:
             done, taken = improving.improve_windows(
-                *self._map, length, self.diagonals, 1, self.run, GRAIN // 2
+                *self._map, length, self.diagonals, 1, self.run, GRAIN
             )
             state[MEETING] = -1
             self._weigh()
@@ -262,25 +254,6 @@ class _Query:
         """The best way so far, as a plan without any abstraction."""
         way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
         return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
-
-    def _abstract(self, pins: NDArray[np.int32]) -> MultiPath:
-        """The regions' blocks as a plan of their level; its length is that over the pins."""
-        columns = self.grid.shape[1]
-        level = blocks.SIDE.bit_length() - 1
-        plan = np.empty((len(pins) - 1, 3), np.int32)
-        plan[:, 0] = level
-        plan[:, 1], plan[:, 2] = pins[:-1] // columns >> level, pins[:-1] % columns >> level
-        downs, across = np.diff(pins // columns), np.diff(pins % columns)
-        length = sum(
-            improving.least_way(a, b, self.diagonals) for a, b in zip(downs, across, strict=True)
-        )
-        return MultiPath(
-            plan,
-            np.array([0, len(plan)], np.int32),
-            np.zeros(1),
-            float(length) / STRAIGHT,
-            self.straight / STRAIGHT,
-        )
 
 
 _region_runs: dict[tuple[int, int], list[blocks.RegionRun]] = {}
@@ -301,9 +274,19 @@ def _running_percent(density: float) -> int:
     return round(100 * (1.0 + p / (1.0 - (p / _PERCOLATION) ** 5)))
 
 
-@anytime.module(estimate=lambda plan: plan.estimate, name="atp")
+def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:
+    """What tells an easy query from a hard one: density and clustering of obstacles in [0, 1], and
+    the distance in cells, straight ahead and diagonally. `domain` as for `steps`."""
+    grid = domain if isinstance(domain, Grid) else Grid(domain)
+    density, clustering, _ = grid.features
+    distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
+    return {"density": density, "clustering": clustering, "distance": float(distance)}
+
+
+@anytime.module(estimate=lambda plan: plan.estimate, features=features_of, name="atp")
 def find_path(domain, start, goal):
-    """Plan a path from start to goal; `domain` is the probability of being blocked of each cell."""
+    """Plan a path from start to goal; `domain` is a `Grid` or each cell's probability of being
+    blocked."""
     for step in steps(domain, start, goal):
         anytime.charge(step.work)
         yield step.plan

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from planners.frontier import least_way, next_base, pop, sift_up
 from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN
 
+FRONTIER = "f8c084d5e1a0"
+
 FOUND = 0
 SIDE, MOST = 8, 32
 UNKNOWN = 255
@@ -43,8 +45,10 @@ class Regions(NamedTuple):
 
 
 class RegionRun(NamedTuple):
-    """Arrays of a search over regions: label, heap, key and slot as in other searches; of each region
-    pin, the cell where it is entered, and parent, the region from which."""
+    """Arrays of a search over regions: label, heap, key and slot as in other searches.
+
+    pin: of each region, the cell where it is entered. parent: the region from which.
+    """
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]

@@ -4,9 +4,9 @@ A grid is flat bytes of costs: `wall` is impassable, every other value at least 
 10 000 straight and 14 142 diagonally, times the dearest cell that it sweeps; a diagonal sweeps both
 orthogonal cells, so corners are never cut. Labels and bases are those of `planners.search`.
 
-Kernels of other files call these. numba's cache does not see such a callee change, so whoever
-imports kernels from here also states this file's digest (a test compares): a change here then
-touches the callers' files, and their machine code is made anew.
+Kernels of other files call these, and numba's cache does not see a callee in another file change.
+So such a file states this one's digest as `FRONTIER` (a test compares): who changes this file
+touches those, and all of their machine code is made anew.
 """
 
 import numpy as np

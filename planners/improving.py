@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from planners.frontier import least_way, next_base, path_to, pop, sift_up, step_cost
 from planners.search import CLOSED, DIAGONAL, LAST, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
+FRONTIER = "f8c084d5e1a0"
+
 FOUND = 0
 SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, PERCENT, LOWEST, COUNT, POSITION, STEPS = range(11)
 """State of a search: nodes in the heap; base of its labels; cost of the way in hand; by how much it

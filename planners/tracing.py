@@ -23,6 +23,8 @@ from planners.blocks import (
 from planners.frontier import least_way, step_cost
 from planners.search import DIAGONAL, SPAN
 
+FRONTIER = "f8c084d5e1a0"
+
 TAUT = 4
 """How often pins are drawn taut."""
 

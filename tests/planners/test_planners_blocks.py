@@ -37,7 +37,7 @@ def test_regions_are_what_hangs_together_within_a_block(seed, rows, columns, den
         for left in range(0, columns, SIDE):
             labels, count = ndimage.label(free[top : top + SIDE, left : left + SIDE])
             for k in range(1, count + 1):
-                cells = np.argwhere(labels == k) + (top, left)
+                cells = np.argwhere(labels == k) + np.array([top, left])
                 expected.add(frozenset(map(tuple, cells.tolist())))
     assert regions_of(free) == expected
 
