@@ -99,7 +99,7 @@ def anywhere(rng: np.random.Generator, count: int = 40) -> Iterator[Domain]:
 
 
 def floor_features(sensed: SensedMap, start: Cell, goal: Cell) -> dict[str, float]:
-    """Density and clustering of the floor as they are behind the errors of sensing, and the distance.
+    """Density and clustering of the floor behind the errors of sensing, and the distance.
 
     With a share e of cells wrong, independently, the density p is seen as e + (1 - 2e) p, and the
     covariance of neighbours (1 - 2e)² times too small.
