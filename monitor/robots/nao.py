@@ -108,7 +108,7 @@ class NaoRobot:
         self.plans = 0
         self.switches = 0
         self.reading = body.read()
-        self._energy_model = energy
+        self._power = float(energy.power(self.figures.speed)), energy.idle  # moving, standing
         self._energy = self._driven = 0.0
         self._since = self._presented = clock.now()
         self._hopeful = self._since  # when a plan last brought it nearer
@@ -150,12 +150,13 @@ class NaoRobot:
 
     def situation(self) -> Situation:
         self.attend()
-        return Situation(self._energy, max(self.apart(), 1e-3), 0.0, False, self._ending)
+        to_go = 0.0 if self._decided else max(self.apart(), 1e-3)
+        return Situation(self._energy, to_go, 0.0, False, self._ending)
 
     def begin(self, plan: Solution, speed: float) -> None:
         """Take up a plan if none is in execution, or if it is better by the threshold."""
         self.attend()
-        if self._ending is not None or self.plans == self.manner.plans:
+        if self._ending is not None or self._decided:
             return
         execution = self._execution
         if execution is not None:  # it may come a little nearer to obstacles than a new one
@@ -183,8 +184,11 @@ class NaoRobot:
         """Nothing to do: what was heard is kept by whoever listens."""
 
     def complete(self) -> None:
-        """A frame ends with its thinking; the plan goes on."""
+        """A frame ends with its thinking; the plan goes on. The last plan is executed to its end,
+        and nobody thinks meanwhile."""
         self.attend()
+        while self._decided and self._ending is None:
+            self.wait(0.1)
 
     def work(self, seconds: float) -> None:
         self.wait(seconds)
@@ -224,9 +228,16 @@ class NaoRobot:
 
     # --- Execution.
 
+    @property
+    def _decided(self) -> bool:
+        """Whether no other plan may be taken up."""
+        return self.plans == self.manner.plans
+
     def attend(self) -> None:
         """Bring everything up to now: energy, the plan's actions, falls, the ending."""
         now = self.clock.now()
+        if now == self._since and self._execution is not None:
+            return  # it was just brought there
         passed, self._since = now - self._since, now
         try:
             before, self.reading = self.reading, self.body.read()
@@ -235,8 +246,7 @@ class NaoRobot:
             self._execution = None
             return
         moving = self._execution is not None
-        power = float(self._energy_model.power(self.figures.speed))
-        self._energy += passed * (power if moving else self._energy_model.idle)
+        self._energy += passed * self._power[0 if moving else 1]
         self._driven += passed * moving
         if math.dist(self.reading.pose_in_world[:2], self._track[-1][:2]) > 0.01:
             self._track.append(self.reading.pose_in_world)
@@ -270,7 +280,7 @@ class NaoRobot:
         if action is not None and action.name == "walk":
             self._touched.append((*self._ahead(action), self.clock.now() + _TOUCHED_FOR))
         self._drop()
-        if self.falls > self.manner.falls:
+        if self.falls > self.manner.falls or self._decided:
             self._ending = Ending.FALLEN
 
     def _ahead(self, walk: nao_plan.Action) -> tuple[float, float]:
