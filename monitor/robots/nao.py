@@ -14,7 +14,7 @@ from monitor.missions import Energy
 from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
 from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_hearing import Hearing
-from monitor.robots.nao_planning import Errand, new_query
+from monitor.robots.nao_planning import Errand, Planning, new_query
 from monitor.robots.nao_scenes import Goal
 from monitor.states import Situation
 from planners import nao_plan
@@ -98,15 +98,18 @@ class NaoRobot:
         sonars: Sonars | None = None,
         figures: Body | None = None,
         manner: Manner | None = None,
+        planning: Planning | None = None,
         drift: Drift | None = None,
         seed: int = 0,
     ) -> None:
         self.body, self.clock, self.goal = body, clock, goal
         self.figures, self.manner = figures or Body(), manner or Manner()
+        self.planning = planning or Planning()
         self.drift = drift or Drift()
         self.falls = 0
         self.plans = 0
         self.switches = 0
+        self.gains: list[float] = []  # metres by which the plan of each switch was better
         self.reading = body.read()
         self._power = float(energy.power(self.figures.speed)), energy.idle  # moving, standing
         self._energy = self._driven = 0.0
@@ -116,7 +119,7 @@ class NaoRobot:
         self._posture = "Crouch"  # the last one that had a name
         self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
         self.hearing = Hearing(self, sonars or Sonars())
-        self.query = new_query(self._world(self.hearing.known), seed)
+        self.query = new_query(self._world(self.hearing.known), seed, self.planning)
         self._interrupted = False
         self._ending: Ending | None = None
         self._track: list[tuple[float, float, float]] = [self.reading.pose_in_world]
@@ -171,6 +174,7 @@ class NaoRobot:
             if value >= value_now - (_DANGER if young else self.manner.threshold):
                 return
             self.switches += 1
+            self.gains.append(value_now - value)
         elif value >= self.query.value_of(NOTHING) - _WORTH:
             return
         self._hopeful = self.clock.now()
@@ -324,7 +328,7 @@ class NaoRobot:
             execution.began = self.clock.now()
             execution.heading = self.reading.pose_in_world[2]
             execution.rises = self._rises(action)
-            execution.running = self._command(action)
+            execution.running = command(self.body, self.clock, action)
 
     def _drop(self) -> None:
         """No plan is in execution any more."""
@@ -337,15 +341,6 @@ class NaoRobot:
             and int(action.ahead) in STANDING
             and self.reading.posture not in {POSTURES[posture] for posture in STANDING}
         )
-
-    def _command(self, action: nao_plan.Action) -> Action:
-        if action.name == "walk":
-            return self.body.walk(action.ahead, action.left, 0.0)
-        if action.name == "turn":
-            return self.body.walk(0.0, 0.0, action.ahead)
-        if action.name == "posture":
-            return self.body.posture(POSTURES[int(action.ahead)])
-        return _Pause(self.clock, action.ahead)
 
     # --- What plans are simulated in.
 
@@ -373,6 +368,8 @@ class NaoRobot:
             current=action,
             elapsed=self.clock.now() - execution.began if execution and action else 0.0,
             drift=self.drift.mean,
+            effort=self.planning.effort,
+            collision=self.planning.collision,
             body=self.figures,
         )
 
@@ -393,6 +390,17 @@ class NaoRobot:
         """Metres to the goal, by odometry."""
         goal = self.goal.place(self.clock.now() - self._presented)
         return math.dist(self.reading.pose_in_world[:2], goal)
+
+
+def command(body: NaoBody, clock: Clock, action: nao_plan.Action) -> Action:
+    """Let a body begin an action of a plan."""
+    if action.name == "walk":
+        return body.walk(action.ahead, action.left, 0.0)
+    if action.name == "turn":
+        return body.walk(0.0, 0.0, action.ahead)
+    if action.name == "posture":
+        return body.posture(POSTURES[int(action.ahead)])
+    return _Pause(clock, action.ahead)
 
 
 class _Pause:

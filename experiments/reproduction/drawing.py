@@ -1,0 +1,57 @@
+"""The objective of a NAO's plan in execution as a picture. [PRP16] §4 and Fig. 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from anytime.pictures import COLOURS
+from experiments.reproduction.executions import ahead, surprised
+from experiments.reproduction.ways import OURS, PAPER
+
+LEVELS = {"before": 0.06, "after Stand": 0.18, "never above": 0.22, "at the end": 0.16}
+"""What the paper prints of one run."""
+STEP = 0.45
+"""By how much an obstacle raised it in another."""
+
+
+def draw(folder: Path, seed: int) -> Path:
+    """Draw what a plan in execution is worth: with the drift of standing up unknown and learnt, and
+    when an obstacle appears, by the paper's rule and by ours. Returns the file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (runs, steps) = plt.subplots(1, 2, figsize=(11, 4.2), constrained_layout=True)
+    for way, label, style in ((PAPER, "drift unknown", "-"), (OURS, "drift learnt", "--")):
+        run = ahead(seed, way)
+        colour = COLOURS[0 if way is PAPER else 1]
+        runs.plot(run.times, run.objective["paper"], style, color=colour, label=label)
+        runs.plot(run.times[run.stood], run.objective["paper"][run.stood], "o", color=colour)
+    for name, level in LEVELS.items():
+        runs.axhline(level, color="0.6", linewidth=0.8, linestyle=":")
+        runs.annotate(f"{name} {level}", (0.0, level), va="bottom", fontsize=8, color="0.35")
+    runs.set(title="A plan in execution (o: it stands)", ylim=(0, None))
+    execution, seen = surprised(seed)
+    for rule, label, style in (
+        ("paper", "at the obstacle's place (paper)", "-"),
+        ("stops", "where it touches, and a fall (ours)", "--"),
+    ):
+        colour = COLOURS[0 if rule == "paper" else 1]
+        steps.plot(execution.times, execution.objective[rule], style, color=colour, label=label)
+    before = float(execution.objective["paper"][seen - 1])
+    steps.axhline(before + STEP, color="0.6", linewidth=0.8, linestyle=":")
+    steps.annotate(
+        f"the paper's step +{STEP}", (0.0, before + STEP), va="bottom", fontsize=8, color="0.35"
+    )
+    highest = max(float(values.max()) for values in execution.objective.values())
+    steps.set(title="An obstacle appears", ylim=(0, 1.35 * max(highest, before + STEP)))
+    for axes in (runs, steps):
+        axes.set(xlabel="time since it began [s]", ylabel="objective [m]")
+    runs.legend(frameon=False, loc="lower right")
+    steps.legend(frameon=False, loc="upper left")
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / "reproduce-nao.png"
+    figure.savefig(target, dpi=150)
+    plt.close(figure)
+    return target
