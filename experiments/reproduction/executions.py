@@ -152,17 +152,15 @@ def surprised(seed: int) -> tuple[Execution, int]:
     """An obstacle appears in the way of a robot that stands up and walks to its goal: the
     execution, and the index of its first value with the obstacle. [PRP16] Fig. 2.
 
-    The paper does not say how far it had come, nor where the obstacle appeared: it may be anywhere
-    in the first half of its way, and the obstacle anywhere between touching it and the goal.
+    The plan that the paper prints of that moment leads a whole metre, so the robot had only begun
+    to walk. Where the obstacle was, it does not say: anywhere between touching and the goal.
     """
-    nao, rng = Body(), np.random.default_rng((seed, 3))
-    walked = rng.uniform(0.0, 0.5)
-    apart = rng.uniform(nao.radius + _RADIUS + 0.02, AHEAD.goal.at[0] - walked)
+    nao = Body()
+    nearest = nao.radius + _RADIUS + 0.02
+    place = float(np.random.default_rng((seed, 3)).uniform(nearest, AHEAD.goal.at[0]))
     begins = nao.posture_seconds[POSTURES.index(AHEAD.posture), STAND] + nao.step_phase / 2
-    appears = float(begins + nao.command_seconds + walked / nao.speed)
-    scene = replace(
-        AHEAD, seed=seed, obstacles=(Obstacle((walked + apart, 0.0), _RADIUS, appears=appears),)
-    )
+    appears = float(begins + nao.command_seconds)
+    scene = replace(AHEAD, seed=seed, obstacles=(Obstacle((place, 0.0), _RADIUS, appears=appears),))
     direct = (Action("posture", STAND), Action("walk", *AHEAD.goal.at))
     execution = execute(direct, scene, effort(), 0.0)
     return execution, int(np.searchsorted(execution.times, appears))

@@ -129,8 +129,8 @@ CLAIMS: tuple[Claim, ...] = (
 
 
 def settings() -> dict[str, object]:
-    """What was chosen where the paper does not say: the effort of a second, in metres, found so that
-    a plan costs the 0.06 that it prints; the obstacle that the plans it prints go round."""
+    """What was chosen where the paper does not say: the effort of a second, in metres, with which a
+    plan costs the 0.06 that it prints; the obstacle that the plans which it prints go round."""
     return {
         "effort_of_searches": searches.effort(),
         "effort_of_executions": executions.effort(),
