@@ -32,19 +32,19 @@ def draw(folder: Path, seed: int) -> Path:
         runs.axhline(level, color="0.6", linewidth=0.8, linestyle=":")
         runs.annotate(f"{name} {level}", (0.0, level), va="bottom", fontsize=8, color="0.35")
     runs.set(title="A plan in execution (o: it stands)", ylim=(0, None))
-    execution, seen = surprised(seed)
+    run = surprised(seed)
     for rule, label, style in (
         ("paper", "at the obstacle's place (paper)", "-"),
         ("stops", "where it touches, and a fall (ours)", "--"),
     ):
         colour = COLOURS[0 if rule == "paper" else 1]
-        steps.plot(execution.times, execution.objective[rule], style, color=colour, label=label)
-    before = float(execution.objective["paper"][seen - 1])
+        steps.plot(run.times, run.objective[rule], style, color=colour, label=label)
+    before = float(run.objective["paper"][run.seen - 1])
     steps.axhline(before + STEP, color="0.6", linewidth=0.8, linestyle=":")
     steps.annotate(
         f"the paper's step +{STEP}", (0.0, before + STEP), va="bottom", fontsize=8, color="0.35"
     )
-    highest = max(float(values.max()) for values in execution.objective.values())
+    highest = max(float(values.max()) for values in run.objective.values())
     steps.set(title="An obstacle appears", ylim=(0, 1.35 * max(highest, before + STEP)))
     for axes in (runs, steps):
         axes.set(xlabel="time since it began [s]", ylabel="objective [m]")

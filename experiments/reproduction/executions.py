@@ -41,13 +41,14 @@ class Execution:
     """What a plan was worth while it was executed.
 
     times: seconds since it began, float [n]. objective: by the rule of what a collision does,
-    float [n] each. stood: index of the first value after standing up. apart: metres from the goal
-    at the end, by odometry.
+    float [n] each. stood, seen: index of the first value after standing up, and with something in
+    the world; n if there is none. apart: metres from the goal at the end, by odometry.
     """
 
     times: np.ndarray
     objective: dict[str, np.ndarray]
     stood: int
+    seen: int
     apart: float
 
 
@@ -57,7 +58,8 @@ def execute(actions: Sequence[Action], scene: Scene, effort: float, drift: float
     body, figures = SimulatedNao(scene, clock), Body()
     times: list[float] = []
     objective: dict[str, list[float]] = {rule: [] for rule in RULES}
-    posture, stood, started = scene.posture, 0, clock.now()
+    around: list[bool] = []  # whether something was in the world
+    posture, stood, started = scene.posture, None, clock.now()
 
     def look(done: int, current: Action | None, began: float) -> None:
         nonlocal posture
@@ -69,6 +71,7 @@ def execute(actions: Sequence[Action], scene: Scene, effort: float, drift: float
         ]
         passed = clock.now() - started
         times.append(passed)
+        around.append(bool(discs))
         for rule in RULES:
             world = plan_world(
                 scene.goal.at,
@@ -95,12 +98,13 @@ def execute(actions: Sequence[Action], scene: Scene, effort: float, drift: float
             break
         body.wait(figures.command_seconds)
         look(done + 1, None, clock.now())
-        if not stood and action.name == "posture" and int(action.ahead) in STANDING:
+        if stood is None and action.name == "posture" and int(action.ahead) in STANDING:
             stood = len(times) - 1
     return Execution(
         np.array(times),
         {rule: np.array(values) for rule, values in objective.items()},
-        stood,
+        len(times) if stood is None else stood,
+        around.index(True) if any(around) else len(times),
         math.dist(body.read().pose_in_world[:2], scene.goal.at),
     )
 
@@ -148,9 +152,9 @@ def ahead(seed: int, way: Way) -> Execution:
 
 
 @cache
-def surprised(seed: int) -> tuple[Execution, int]:
-    """An obstacle appears in the way of a robot that stands up and walks to its goal: the
-    execution, and the index of its first value with the obstacle. [PRP16] Fig. 2.
+def surprised(seed: int) -> Execution:
+    """An obstacle appears in the way of a robot that stands up and walks to its goal. [PRP16]
+    Fig. 2.
 
     The plan that the paper prints of that moment leads a whole metre, so the robot had only begun
     to walk. Where the obstacle was, it does not say: anywhere between touching and the goal.
@@ -162,8 +166,7 @@ def surprised(seed: int) -> tuple[Execution, int]:
     appears = float(begins + nao.command_seconds)
     scene = replace(AHEAD, seed=seed, obstacles=(Obstacle((place, 0.0), _RADIUS, appears=appears),))
     direct = (Action("posture", STAND), Action("walk", *AHEAD.goal.at))
-    execution = execute(direct, scene, effort(), 0.0)
-    return execution, int(np.searchsorted(execution.times, appears))
+    return execute(direct, scene, effort(), 0.0)
 
 
 # --- The claims, one draw each.
@@ -180,9 +183,9 @@ def objective_after_stand(seed: int, way: Way) -> tuple[float, ...]:
 
 def obstacle_step(seed: int, way: Way) -> tuple[float, ...]:
     """By how much that rises when an obstacle appears in its way."""
-    execution, seen = surprised(seed)
-    values = execution.objective[way.planning.collision]
-    return (float(values[seen] - values[seen - 1]),)
+    run = surprised(seed)
+    values = run.objective[way.planning.collision]
+    return (float(values[run.seen] - values[run.seen - 1]),)
 
 
 def skip_executed(seed: int, way: Way) -> bool:
