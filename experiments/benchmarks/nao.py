@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.benchmarks import nao_worlds
+from experiments.benchmarks import nao_oracle, nao_worlds
 from experiments.benchmarks.figures import Benchmark, share_interval
 from experiments.benchmarks.nao_worlds import Life, Outcome, briefing, lived, outcome
 from monitor.robots.nao_scenes import read_scene
@@ -59,8 +59,7 @@ def measure(
             worlds.append(found)
     figures |= nao_worlds.figures(worlds)
     _connection(figures, reasons, seed, progress)
-    figures["oracle.within_cm"] = None
-    reasons["oracle.within_cm"] = "needs pybullet, which is a test of its own"
+    _oracle(figures, reasons, range(seed, seed + 40), progress)
     settings = {"seeds": len(seeds), "worlds": count, "not_measured": reasons}
     return Benchmark("nao", figures, settings, seed)
 
@@ -102,6 +101,17 @@ def _scene(task: tuple[str, int]) -> Life:
     name, seed = task
     file = Path(str(files("experiments") / "data" / "scenes" / f"{name}.toml"))
     return lived(briefing(), read_scene(file, seed=seed))
+
+
+def _oracle(
+    figures: dict, reasons: dict, seeds: Sequence[int], progress: Callable[[str], None]
+) -> None:
+    if not nao_oracle.available():
+        figures["oracle.within_cm"] = None
+        reasons["oracle.within_cm"] = nao_oracle.MISSING
+        return
+    progress(f"{len(seeds)} worlds beside Bullet's")
+    figures |= nao_oracle.figures(seeds)
 
 
 def _connection(figures: dict, reasons: dict, seed: int, progress: Callable[[str], None]) -> None:
