@@ -44,7 +44,9 @@ class Reproduction:
     def __repr__(self) -> str:
         names = [each.claim.name for each in self.judged]
         width = max(map(len, names))
-        lines = [f"{'claim':<{width}}  {'paper':>7} {'its way':>8}  {'5 to 95 %':<15} {'ours':>7}"]
+        lines = [
+            f"{'claim':<{width}}  {'paper':>7} {'its way':>8}  {'low to high':<18} {'ours':>8}"
+        ]
         for each in self.judged:
             lines += _rows(each, width)
         held = sum(each.held for each in self.judged)
@@ -141,8 +143,8 @@ def _rows(each: Judged, width: int) -> list[str]:
         name = each.claim.name if first else f"  {value.name}"
         bounds = f"{_number(papers.low)} to {_number(papers.high)}"
         lines.append(
-            f"{name:<{width}}  {_number(value.paper):>7} {_number(papers.ours):>8}  {bounds:<15} "
-            f"{_number(ours.ours):>7}  {sign:<9}  {each.claim.text if first else ''}".rstrip()
+            f"{name:<{width}}  {_number(value.paper):>7} {_number(papers.ours):>8}  {bounds:<18} "
+            f"{_number(ours.ours):>8}  {sign:<9}  {each.claim.text if first else ''}".rstrip()
         )
     return lines
 
