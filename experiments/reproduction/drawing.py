@@ -6,13 +6,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 from anytime.pictures import COLOURS
-from experiments.reproduction.executions import ahead, obstacle_step, surprised
+from experiments.reproduction.executions import (
+    AFTER_STAND,
+    END,
+    MOST,
+    STEP,
+    ahead,
+    obstacle_step,
+    surprised,
+)
+from experiments.reproduction.searches import INITIAL
 from experiments.reproduction.ways import OURS, PAPER
 
-LEVELS = {"before": 0.06, "after Stand": 0.18, "never above": 0.22, "at the end": 0.16}
-"""What the paper prints of one run."""
-STEP = 0.45
-"""By how much an obstacle raised it in another."""
 _DRAWS = 15
 
 
@@ -34,7 +39,8 @@ def draw(folder: Path, seed: int) -> Path:
         colour = COLOURS[0 if way is PAPER else 1]
         runs.plot(run.times, run.objective["paper"], style, color=colour, label=label)
         runs.plot(run.times[run.stood], run.objective["paper"][run.stood], "o", color=colour)
-    for name, level in LEVELS.items():
+    levels = {"before": INITIAL, "after Stand": AFTER_STAND, "at the end": END, "never above": MOST}
+    for name, level in levels.items():
         runs.axhline(level, color="0.6", linewidth=0.8, linestyle=":")
         runs.annotate(f"{name} {level}", (0.0, level), va="bottom", fontsize=8, color="0.35")
     runs.set(title="A plan in execution (o: it stands)", ylim=(0, None))

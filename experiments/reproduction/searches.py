@@ -15,11 +15,11 @@ from typing import Any
 from experiments.benchmarks.replanning import CLOSE, GOAL, body, detour
 from experiments.reproduction.ways import Way
 from monitor.robots.nao_missions import MACHINE
-from monitor.robots.nao_planning import Planning
+from monitor.robots.nao_planning import Planning, new_query
 from planners import query
 from planners.nao import CROUCH, SIT, STAND, STANDING
-from planners.nao_plan import Action, Pose, actions_of, plan, plan_world, trajectory
-from planners.query import Model, Query
+from planners.nao_plan import Action, Pose, actions_of, plan_world, trajectory
+from planners.query import Query
 
 PRINTED = (
     ((0.1, 0.27), (0.93, -0.25)),
@@ -48,7 +48,7 @@ class Search:
 
     def __init__(self, seed: int, way: Way, *, obstacle: bool) -> None:
         planning = replace(way.planning, effort=effort())
-        self.query = searched(plan, world(planning, obstacle), seed, planning)
+        self.query = new_query(world(planning, obstacle), seed, planning)
 
     @property
     def seconds(self) -> float:
@@ -90,13 +90,6 @@ class Search:
             action.name == "walk" and before.posture in STANDING and after.posture == CROUCH
             for action, (before, after) in steps
         )
-
-
-def searched(model: Model, world: Any, seed: int, planning: Planning) -> Query:
-    """A query in the given way."""
-    return Query(
-        model, world, seed=seed, population=planning.population, operators=planning.operators
-    )
 
 
 def world(planning: Planning, obstacle: bool) -> dict[str, Any]:
@@ -152,7 +145,8 @@ def five(rng: Any) -> float:
 
 def toy(seed: int, way: Way) -> bool:
     """The program of §2 finds its five, to a hundredth, before the population has converged."""
-    found = searched(five, None, seed, way.planning)
+    planning = way.planning
+    found = Query(five, population=planning.population, seed=seed, operators=planning.operators)
     found.run(evaluations=LATE / MACHINE.seconds("find_plan", 1.0), until=0.01)
     return found.value <= 0.01
 
