@@ -1,4 +1,4 @@
-"""Commands of the experiments: demo, bench, warm-up."""
+"""Commands of the experiments: demo, bench, reproduce, warm-up."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from experiments.benchmarks.figures import Benchmark
 
 BENCHMARKS = ("planner", "compiler", "mission", "query", "nao")
+PARTS = ("nao",)
 
 
 def declare(commands: Any) -> None:
@@ -36,6 +37,15 @@ def declare(commands: Any) -> None:
         "--maps", type=Path, metavar="DIR", help="MovingAI maps; default $ANYTIME_MAPS"
     )
     parser.add_argument("--seed", type=natural, default=0, help="of everything random")
+    parser = add_command(commands, "reproduce", reproduce, "the papers' claims beside our figures")
+    parser.add_argument(
+        "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
+    )
+    parser.add_argument("--quick", action="store_true", help="at most 4 minutes on 2 cores")
+    parser.add_argument("--seed", type=natural, default=0, help="of the first draw")
+    parser.add_argument(
+        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the pictures"
+    )
     add_command(commands, "warm-up", warm_up, "compile the kernels, so that the first call is fast")
 
 
@@ -79,6 +89,27 @@ def bench(options: argparse.Namespace) -> Answer:
     width = max(len(key) for key in found.figures)
     lines = [f"{key:<{width}}  {_shown(value)}" for key, value in found.figures.items()]
     return Answer("\n".join(lines), _figures(found))
+
+
+def reproduce(options: argparse.Namespace) -> Answer:
+    """Measure what the papers claim, in their way and in ours, and draw it.
+
+    A claim that does not hold is a finding and no failure: the exit code is 0.
+    """
+    unknown = [part for part in options.parts if part not in PARTS]
+    if unknown:
+        raise AnytimeError(f"nothing named {unknown[0]!r} to reproduce; choose {', '.join(PARTS)}")
+    from experiments.reproduction.reproducing import measure
+
+    with progress("draws") as bar:
+        found = measure(
+            tuple(dict.fromkeys(options.parts)) or PARTS,
+            quick=options.quick,
+            seed=options.seed,
+            output=options.output,
+            progress=bar,
+        )
+    return Answer(repr(found), _figures(found.benchmark))
 
 
 def warm_up(options: argparse.Namespace) -> Answer:

@@ -87,6 +87,16 @@ class Cone:
             min((self._to_wall(*wall) for wall in around.walls), default=math.inf),
         )
 
+    def bounds(self, reach: float) -> tuple[float, float, float, float]:
+        """The least and greatest x, then y, of what of it is within `reach` metres."""
+        angles = [self.bearing - self.half_angle, self.bearing + self.half_angle]
+        turn = math.pi / 2
+        first = math.ceil(angles[0] / turn)  # where the arc is farthest along an axis
+        angles += [turn * quarter for quarter in range(first, math.floor(angles[1] / turn) + 1)]
+        xs = [self.x, *(self.x + reach * math.cos(angle) for angle in angles)]
+        ys = [self.y, *(self.y + reach * math.sin(angle) for angle in angles)]
+        return min(xs), max(xs), min(ys), max(ys)
+
     def _local(self, x: float, y: float) -> tuple[float, float]:
         """A point seen from the apex, the axis being the first direction."""
         cos, sin = math.cos(self.bearing), math.sin(self.bearing)

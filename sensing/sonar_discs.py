@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,15 @@ _DOUBT = 0.5  # echoes by which a disc that is as good as the best may be worse
 _REFUTED = 2  # later readings that contradict a disc which is gone: one may be a lost echo
 
 
+@lru_cache(maxsize=2)  # a robot asks for those of its newest map again and again
 def obstacles(heard: SonarMap) -> Array:
     """Discs to keep away from, the nearest to the robot first: x, y, radius in world, float [n, 3].
 
     The latest echo that is not explained yet is explained by that disc on its arc which agrees best
     with everything else that was heard; it explains other echoes, too. Where several discs are as
     good, one stands in their middle, or, if they are far apart, a chain of discs covers them all.
-    An echo for which later readings leave no disc is of something that has gone.
+    An echo for which later readings leave no disc is of something that has gone. The array is
+    read-only.
     """
     arcs = list(reversed(heard.arcs))
     told = np.array([arc.told for arc in arcs])
@@ -51,7 +54,9 @@ def obstacles(heard: SonarMap) -> Array:
         good = score >= score.max() - _DOUBT
         found += _chain(discs[good], score[good])
         unexplained &= ~(agreement[good] > 0).any(axis=0)
-    return _nearest_first(np.array(found).reshape(-1, 3), heard)
+    discs = _nearest_first(np.array(found).reshape(-1, 3), heard)
+    discs.flags.writeable = False
+    return discs
 
 
 def _agreement(discs: Array, arcs: Sequence[Arc]) -> tuple[Array, NDArray[np.bool_]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +65,7 @@ class Arc:
     time: float
     doubted: bool = False
 
-    @property
+    @cached_property
     def stand(self) -> tuple[int, int, int, int]:
         """Which sonar it is of, and roughly where that was: a later arc from there replaces it."""
         step, turn = APART
@@ -198,10 +199,12 @@ class SonarMap:
     def _window(self, cone: Cone, reach: float) -> tuple[slice, slice]:
         """The part of the grid that a cone may touch."""
         rows, columns = self.log_odds.shape
-        left = math.floor((cone.x - reach - self.corner[0]) / self.cell)
-        right = math.ceil((cone.x + reach - self.corner[0]) / self.cell)
-        upper = math.floor((self.corner[1] - cone.y - reach) / self.cell)
-        lower = math.ceil((self.corner[1] - cone.y + reach) / self.cell)
+        west, east, south, north = cone.bounds(reach)
+        # one cell more, because a cell may touch the arc whose middle lies outside of the cone
+        left = math.floor((west - self.corner[0]) / self.cell) - 1
+        right = math.ceil((east - self.corner[0]) / self.cell) + 1
+        upper = math.floor((self.corner[1] - north) / self.cell) - 1
+        lower = math.ceil((self.corner[1] - south) / self.cell) + 1
         return (
             slice(min(max(upper, 0), rows), min(max(lower, 0), rows)),
             slice(min(max(left, 0), columns), min(max(right, 0), columns)),

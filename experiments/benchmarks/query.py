@@ -35,6 +35,7 @@ from experiments.benchmarks.rivals import (
 from experiments.benchmarks.rivals.moving_peaks import PERIOD, Course, Landscape, offline_error
 from experiments.benchmarks.rivals.moving_peaks import peaks as peaks_function
 from experiments.benchmarks.rivals.swarms import PEERS
+from monitor.robots.nao_planning import Planning
 from planners import query
 from planners.nao_plan import plan
 from planners.query import SWITCHES, Operators, Query
@@ -171,7 +172,8 @@ def _papers_plan_after_the_removal(seed: int) -> float:
     """How far aside the paper's operators still walk, 3 s after the obstacle went: their whole
     population is the plan that the paper prints, up to a millimetre."""
     world = sitting(disc=(0.5, 0.0, 0.17))  # the printed plan passes it
-    timed = Timed(world, seed, Operators.paper(), 1000)
+    paper = Planning.paper()
+    timed = Timed(world, seed, paper.operators, paper.population)
     rng = np.random.default_rng(seed)
     walks = np.array(_PRINTED)
     timed.step()

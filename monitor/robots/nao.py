@@ -15,7 +15,7 @@ from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_execution import Execution, command, leads
 from monitor.robots.nao_hearing import Hearing
 from monitor.robots.nao_odometry import FROZEN, Odometry
-from monitor.robots.nao_planning import Errand, new_query
+from monitor.robots.nao_planning import Errand, Planning, new_query
 from monitor.robots.nao_scenes import Goal
 from monitor.robots.nao_story import Story
 from monitor.states import Situation
@@ -79,18 +79,21 @@ class NaoRobot:
         sonars: Sonars | None = None,
         figures: Body | None = None,
         manner: Manner | None = None,
+        planning: Planning | None = None,
         drift: Drift | None = None,
         seed: int = 0,
     ) -> None:
         self.body, self.clock, self.goal = body, clock, goal
         self.figures, self.manner = figures or Body(), manner or Manner()
+        self.planning = planning or Planning()
         self.drift = drift or Drift()
         self.falls = 0
         self.plans = 0
         self.switches = 0
+        self.gains: list[float] = []  # metres by which the plan of each switch was better
         self.odometry = Odometry(self.figures.speed, self.figures.turn_rate)
         self.reading = self.read()
-        self._energy_model = energy
+        self._power = float(energy.power(self.figures.speed)), energy.idle  # moving, standing
         self._energy = self._driven = 0.0
         self._since = self._presented = clock.now()
         self._hopeful = self._since  # when a plan last brought it nearer
@@ -98,7 +101,7 @@ class NaoRobot:
         self._posture = "Crouch"  # the last one that had a name
         self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
         self.hearing = Hearing(self, sonars or Sonars())
-        self.query = new_query(self._world(self.hearing.known), seed)
+        self.query = new_query(self._world(self.hearing.known), seed, self.planning)
         self._tries = 0  # walks broken off since the pose last changed
         self._ending: Ending | None = None
         self._story = Story(self.reading.pose_in_world)
@@ -139,12 +142,13 @@ class NaoRobot:
 
     def situation(self) -> Situation:
         self.attend()
-        return Situation(self._energy, max(self.apart(), 1e-3), 0.0, False, self._ending)
+        to_go = 0.0 if self._decided else max(self.apart(), 1e-3)
+        return Situation(self._energy, to_go, 0.0, False, self._ending)
 
     def begin(self, plan: Solution, speed: float) -> None:
         """Take up a plan if none is in execution, or if it is better by the threshold."""
         self.attend()
-        if self._ending is not None or self.plans == self.manner.plans:
+        if self._ending is not None or self._decided:
             return
         if not self._better(plan):
             return
@@ -169,6 +173,8 @@ class NaoRobot:
             held = self.query.value_of(NOTHING)
         found = self.query.value_of(plan.choices)
         better = found < held - threshold
+        if better and execution is not None:
+            self.gains.append(held - found)
         actions = actions_of(plan.choices)
         current = execution.actions if execution else ()
         kept, other = (actions, current) if better else (current, actions)
@@ -191,8 +197,11 @@ class NaoRobot:
         """Nothing to do: what was heard is kept by whoever listens."""
 
     def complete(self) -> None:
-        """A frame ends with its thinking; the plan goes on."""
+        """A frame ends with its thinking; the plan goes on. The last plan is executed to its end,
+        and nobody thinks meanwhile."""
         self.attend()
+        while self._decided and self._ending is None:
+            self.wait(0.1)
 
     def work(self, seconds: float) -> None:
         self.wait(seconds)
@@ -226,9 +235,16 @@ class NaoRobot:
 
     # --- Execution.
 
+    @property
+    def _decided(self) -> bool:
+        """Whether no other plan may be taken up."""
+        return self.plans == self.manner.plans
+
     def attend(self) -> None:
         """Bring everything up to now: energy, the plan's actions, falls, the ending."""
         now = self.clock.now()
+        if now == self._since and self._execution is not None:
+            return  # it was just brought there
         passed, self._since = now - self._since, now
         try:
             before, self.reading = self.reading, self.read()
@@ -237,8 +253,7 @@ class NaoRobot:
             self._execution = None
             return
         moving = self._execution is not None
-        power = float(self._energy_model.power(self.figures.speed))
-        self._energy += passed * (power if moving else self._energy_model.idle)
+        self._energy += passed * self._power[0 if moving else 1]
         self._driven += passed * moving
         if self.odometry.unseen == 0.0:
             self._tries = 0
@@ -274,7 +289,7 @@ class NaoRobot:
         if action is not None and action.name == "walk":
             self._touched.append((*self._ahead(action), self.clock.now() + _TOUCHED_FOR))
         self._drop()
-        if self.falls > self.manner.falls:
+        if self.falls > self.manner.falls or self._decided:
             self._ending = Ending.FALLEN
 
     def _ahead(self, walk: nao_plan.Action) -> tuple[float, float]:
@@ -368,6 +383,8 @@ class NaoRobot:
             current=action,
             elapsed=self.clock.now() - execution.began if execution and action else 0.0,
             drift=self.drift.mean,
+            effort=self.planning.effort,
+            collision=self.planning.collision,
             body=self.figures,
         )
 

@@ -22,7 +22,7 @@ from monitor.robots.nao import Manner, NaoRobot
 from monitor.robots.nao_body import NaoBody
 from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_floor import plan_of
-from monitor.robots.nao_planning import errands, improve
+from monitor.robots.nao_planning import Planning, errands, improve
 from monitor.robots.nao_scenes import Scene
 from monitor.robots.simulated_nao import SimulatedNao
 from planners.nao import Body
@@ -47,6 +47,7 @@ class NaoBriefing:
     machine: Machine = MACHINE
     frame: float = 0.4
     manner: Manner = field(default_factory=Manner)
+    planning: Planning = field(default_factory=Planning)
 
     @cached_property
     def monitor(self) -> Monitor:
@@ -74,6 +75,7 @@ class NaoBriefing:
             self.mission.energy,
             sonars=scene.sonars,
             manner=self.manner,
+            planning=self.planning,
             drift=drift,
             seed=scene.seed,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ import anytime
 import compiler
 from planners.nao import Body
 from planners.nao_plan import MOST_OBSTACLES, plan, plan_world
-from planners.query import Query, Solution
+from planners.query import Operators, Query, Solution
 from sensing.sonar import Surroundings
 from sensing.sonar_map import Recorded, SonarMap, listenings, obstacles, sonar_map
 
@@ -21,6 +21,25 @@ GRAIN = 4
 
 WORTH = 1e-4
 """Metres by which a plan must be better to be registered."""
+
+
+@dataclass(frozen=True)
+class Planning:
+    """How a NAO's plans are sought, and how they are judged.
+
+    operators, population: of the query. collision, effort: of `planners.nao_plan.plan_world`.
+    """
+
+    operators: Operators = field(default_factory=Operators)
+    population: int = 60
+    collision: str = "stops"
+    effort: float = 0.005
+
+    @classmethod
+    def paper(cls) -> Planning:
+        """The way of [PRP16] §2, §3. It prints no size of the population: one that finds plans and
+        then converges, as it tells, takes about a thousand."""
+        return cls(Operators.paper(), 1000, "paper")
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +115,9 @@ def improve(sonar, errand):
     return find_plan(errand, sonar_map(sonar))
 
 
-def new_query(world: Mapping[str, Any], seed: int) -> Query:
+def new_query(world: Mapping[str, Any], seed: int, planning: Planning | None = None) -> Query:
     """The search of a mission."""
-    return Query(plan, world, seed=seed)
+    planning = planning or Planning()
+    return Query(
+        plan, world, population=planning.population, seed=seed, operators=planning.operators
+    )

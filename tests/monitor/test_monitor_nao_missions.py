@@ -54,8 +54,17 @@ def test_a_floor_holds_everything_of_its_scene():
 def test_without_the_monitor_the_first_plan_is_executed_to_its_end(briefing):
     scene = read_scene(SCENES / "appearing.toml", seed=3)
     fixed = briefing.unmonitored().robot(scene)
-    briefing.unmonitored().live(fixed, 3)
+    report = briefing.unmonitored().live(fixed, 3)
     assert fixed.plans == 1
+    assert not report.frames[-1].calls  # nobody thinks meanwhile
+    assert len(report.frames) < 5
+
+
+def test_without_the_monitor_a_fall_is_the_end(briefing):
+    scene = Scene(goal=Goal((1.5, 0.0)), obstacles=(Obstacle((0.6, 0.0), 0.15, appears=9.5),))
+    fixed = briefing.unmonitored().robot(scene.noiseless())
+    assert briefing.unmonitored().live(fixed).ending is Ending.FALLEN
+    assert fixed.falls == 1
 
 
 def test_the_command_tells_a_scene_from_a_grid_mission(tmp_path, capsys):

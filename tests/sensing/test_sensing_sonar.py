@@ -190,3 +190,18 @@ def test_sonars_that_there_are_not_are_refused(bad, told):
 def test_an_empty_floor_is_silent():
     assert AHEAD.nearest(NOBODY) == math.inf
     assert Sonars().hear(Sonars().distances((0, 0, 0), NOBODY)) == (math.inf, math.inf)
+
+
+@given(cones, st.floats(0.1, 3.0), st.floats(-1, 1), st.floats(0, 1))
+def test_what_is_near_in_a_cone_is_within_its_bounds_and_they_are_no_wider(cone, reach, off, far):
+    west, east, south, north = cone.bounds(reach)
+    bearing = cone.bearing + off * cone.half_angle
+    x = cone.x + far * reach * math.cos(bearing)
+    y = cone.y + far * reach * math.sin(bearing)
+    assert west - 1e-9 <= x <= east + 1e-9
+    assert south - 1e-9 <= y <= north + 1e-9
+    across = cone.bearing + np.linspace(-1, 1, 2001) * cone.half_angle
+    for low, high, at, ways in ((west, east, cone.x, np.cos), (south, north, cone.y, np.sin)):
+        places = [at, *(at + reach * ways(across))]
+        assert min(places) - low < 1e-3
+        assert high - max(places) < 1e-3

@@ -1,0 +1,84 @@
+"""The objective of a NAO's plan in execution as a picture. [PRP16] §4 and Fig. 2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from anytime.pictures import COLOURS
+from experiments.reproduction.executions import (
+    AFTER_STAND,
+    END,
+    MOST,
+    STEP,
+    ahead,
+    obstacle_step,
+    surprised,
+)
+from experiments.reproduction.searches import INITIAL
+from experiments.reproduction.ways import OURS, PAPER
+
+_DRAWS = 15
+
+
+def draw(folder: Path, seed: int) -> Path:
+    """Draw what a plan in execution is worth: with the drift of standing up unknown and learnt, and
+    when an obstacle appears, by the paper's rule and by ours. Returns the file.
+
+    Of a few draws, each that which is the median in the paper's way.
+    """
+    import matplotlib
+
+    ahead_seed, surprised_seed = (_median(claim, seed) for claim in (_end, _step))
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, (runs, steps) = plt.subplots(1, 2, figsize=(11, 4.2), constrained_layout=True)
+    for way, label, style in ((PAPER, "drift unknown", "-"), (OURS, "drift learnt", "--")):
+        run = ahead(ahead_seed, way)
+        colour = COLOURS[0 if way is PAPER else 1]
+        runs.plot(run.times, run.objective["paper"], style, color=colour, label=label)
+        runs.plot(run.times[run.stood], run.objective["paper"][run.stood], "o", color=colour)
+    levels = {"before": INITIAL, "after Stand": AFTER_STAND, "at the end": END, "never above": MOST}
+    for name, level in levels.items():
+        runs.axhline(level, color="0.6", linewidth=0.8, linestyle=":")
+        runs.annotate(f"{name} {level}", (0.0, level), va="bottom", fontsize=8, color="0.35")
+    runs.set(title="A plan in execution (o: it stands)", ylim=(0, None))
+    run = surprised(surprised_seed)
+    for rule, label, style in (
+        ("paper", "at the obstacle's place (paper)", "-"),
+        ("stops", "where it touches, and a fall (ours)", "--"),
+    ):
+        colour = COLOURS[0 if rule == "paper" else 1]
+        steps.plot(run.times, run.objective[rule], style, color=colour, label=label)
+    before = float(run.objective["paper"][run.seen - 1])
+    steps.axhline(before + STEP, color="0.6", linewidth=0.8, linestyle=":")
+    steps.annotate(
+        f"the paper's step +{STEP}", (0.0, before + STEP), va="bottom", fontsize=8, color="0.35"
+    )
+    highest = max(float(values.max()) for values in run.objective.values())
+    steps.set(title="An obstacle appears", ylim=(0, 1.35 * max(highest, before + STEP)))
+    for axes in (runs, steps):
+        axes.set(xlabel="time since it began [s]", ylabel="objective [m]")
+    runs.legend(frameon=False, loc="lower right")
+    steps.legend(frameon=False, loc="upper left")
+    folder.mkdir(parents=True, exist_ok=True)
+    target = folder / "reproduce-nao.png"
+    figure.savefig(target, dpi=150)
+    plt.close(figure)
+    return target
+
+
+def _median(figure: Callable[[int], float], seed: int) -> int:
+    """The seed whose figure is in the middle."""
+    return sorted(range(seed, seed + _DRAWS), key=figure)[_DRAWS // 2]
+
+
+def _end(seed: int) -> float:
+    """What the plan is worth at its end."""
+    return float(ahead(seed, PAPER).objective["paper"][-1])
+
+
+def _step(seed: int) -> float:
+    """By how much the obstacle raises it."""
+    return obstacle_step(seed, PAPER)[0]

@@ -1,0 +1,153 @@
+"""The papers' claims beside our figures, measured in this run."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.benchmarks.figures import Benchmark
+from experiments.reproduction.claims import Claim, Verdict, judge
+from experiments.reproduction.ways import OURS, PAPER, Way
+
+DRAWS, QUICK_DRAWS = 100, 30
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A claim and what became of it: verdicts for each of its values, the paper's way and ours."""
+
+    claim: Claim
+    papers: tuple[Verdict, ...]
+    ours: tuple[Verdict, ...]
+
+    @property
+    def held(self) -> bool:
+        return all(verdict.held for verdict in self.papers)
+
+    @property
+    def held_by_ours(self) -> bool:
+        return all(verdict.held for verdict in self.ours)
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What `reproduce` found, and the pictures that it drew."""
+
+    judged: tuple[Judged, ...]
+    benchmark: Benchmark
+    pictures: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        names = [each.claim.name for each in self.judged]
+        width = max(map(len, names))
+        lines = [
+            f"{'claim':<{width}}  {'paper':>7} {'its way':>8}  {'low to high':<18} {'ours':>8}"
+        ]
+        for each in self.judged:
+            lines += _rows(each, width)
+        held = sum(each.held for each in self.judged)
+        lines.append(f"{held} of {len(self.judged)} claims hold in the paper's own way")
+        lines += map(str, self.pictures)
+        return "\n".join(lines)
+
+
+def measure(
+    parts: Sequence[str],
+    *,
+    quick: bool = False,
+    seed: int = 0,
+    output: Path = Path(),
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Reproduction:
+    """Measure the claims of the parts, each in the paper's way and in ours, and draw pictures.
+
+    parts: names of files here, which hold `CLAIMS` and `draw`. A draw of all claims is one seed;
+    the same seeds serve both ways.
+    """
+    modules = {part: importlib.import_module(f"experiments.reproduction.{part}") for part in parts}
+    count = QUICK_DRAWS if quick else DRAWS
+    tasks = [(tuple(parts), one) for one in range(seed, seed + count)]
+    draws: list[Mapping[tuple[str, str], tuple[float, ...]]] = []
+    with ProcessPoolExecutor(2) as pool:
+        for drawn in pool.map(_draw, tasks):
+            draws.append(drawn)
+            progress(len(draws), count)
+    judged: list[Judged] = []
+    for module in modules.values():
+        for claim in module.CLAIMS:
+            papers, ours = (_verdicts(claim, way, draws) for way in (PAPER, OURS))
+            judged.append(Judged(claim, papers, ours))
+    pictures = tuple(module.draw(output, seed) for module in modules.values())
+    settings = {
+        "draws": count,
+        **{name: told for module in modules.values() for name, told in module.settings().items()},
+        "not_measured": {},
+        "claims": {each.claim.name: each.claim.text for each in judged},
+    }
+    return Reproduction(
+        tuple(judged), Benchmark("reproduce", _figures(judged), settings, seed), pictures
+    )
+
+
+def _draw(task: tuple[tuple[str, ...], int]) -> Mapping[tuple[str, str], tuple[float, ...]]:
+    """One draw of every claim in both ways; in one process, so that what they share is made once"""
+    parts, seed = task
+    claims = [
+        claim
+        for part in parts
+        for claim in importlib.import_module(f"experiments.reproduction.{part}").CLAIMS
+    ]
+    return {
+        (claim.name, way.name): claim.draw(seed, way) for claim in claims for way in (PAPER, OURS)
+    }
+
+
+def _verdicts(
+    claim: Claim, way: Way, draws: Sequence[Mapping[tuple[str, str], tuple[float, ...]]]
+) -> tuple[Verdict, ...]:
+    columns = zip(*(drawn[claim.name, way.name] for drawn in draws), strict=True)
+    return tuple(judge(*pair) for pair in zip(claim.values, columns, strict=True))
+
+
+def _figures(judged: Sequence[Judged]) -> dict[str, float | int | None]:
+    figures: dict[str, float | int | None] = {
+        "claims.total": len(judged),
+        "claims.held": sum(each.held for each in judged),
+    }
+    for each in judged:
+        rows = zip(each.claim.values, each.papers, each.ours, strict=True)
+        for value, papers, ours in rows:
+            key = ".".join(part for part in ("claim", each.claim.name, value.name) if part)
+            figures |= {
+                f"{key}.paper": value.paper,
+                f"{key}.ours": papers.ours,
+                f"{key}.low": papers.low,
+                f"{key}.high": papers.high,
+                f"{key}.held": papers.held if value.name else each.held,
+                f"{key}.ours_best": ours.ours,
+                f"{key}.held_by_ours": ours.held if value.name else each.held_by_ours,
+            }
+    return figures
+
+
+def _rows(each: Judged, width: int) -> list[str]:
+    lines: list[str] = []
+    for value, papers, ours in zip(each.claim.values, each.papers, each.ours, strict=True):
+        first = not value.name
+        held, best = (each.held, each.held_by_ours) if first else (papers.held, ours.held)
+        sign = "holds" if held else "only ours" if best else "no"
+        name = each.claim.name if first else f"  {value.name}"
+        bounds = f"{_number(papers.low)} to {_number(papers.high)}"
+        lines.append(
+            f"{name:<{width}}  {_number(value.paper):>7} {_number(papers.ours):>8}  {bounds:<18} "
+            f"{_number(ours.ours):>8}  {sign:<9}  {each.claim.text if first else ''}".rstrip()
+        )
+    return lines
+
+
+def _number(value: float) -> str:
+    return "—" if math.isnan(value) else f"{value:.3g}"
