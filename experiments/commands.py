@@ -37,6 +37,9 @@ def declare(commands: Any) -> None:
         "--maps", type=Path, metavar="DIR", help="MovingAI maps; default $ANYTIME_MAPS"
     )
     parser.add_argument("--seed", type=natural, default=0, help="of everything random")
+    parser.add_argument(
+        "-o", "--output", type=folder, metavar="DIR", help="for pictures, of those that draw"
+    )
     parser = add_command(commands, "reproduce", reproduce, "the papers' claims beside our figures")
     parser.add_argument(
         "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
@@ -88,6 +91,9 @@ def bench(options: argparse.Namespace) -> Answer:
     )
     width = max(len(key) for key in found.figures)
     lines = [f"{key:<{width}}  {_shown(value)}" for key, value in found.figures.items()]
+    if options.output is not None and found.picture is not None:
+        options.output.mkdir(parents=True, exist_ok=True)
+        lines.append(str(found.picture(options.output / f"{found.name}.png")))
     return Answer("\n".join(lines), _figures(found))
 
 
