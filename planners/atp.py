@@ -34,7 +34,7 @@ _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
 _PERCOLATION = 0.407  # density of independent obstacles at which floors fall apart
 _REGION_PERCENT = 110  # weight of the search over regions
 _CORRIDOR_PERCENT = 107
-_WINDOWS = (16, 32, 64)  # cells of the windows, pass by pass …
+_WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
 _WINDOW_SHARE = 3  # … which together take at most so many times the work of the coarse way
 _PATIENCE = 12  # expansions per cell of distance after which a weight was too small
 

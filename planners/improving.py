@@ -17,10 +17,11 @@ from planners.search import CLOSED, DIAGONAL, LAST, NO_PATH, OUT_OF_BUDGET, SPAN
 FRONTIER = "f8c084d5e1a0"
 
 FOUND = 0
-SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, PERCENT, LOWEST, COUNT, POSITION, STEPS = range(11)
+SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, FOLLOWS, PERCENT, LOWEST, COUNT, POSITION = range(11)
 """State of a search: nodes in the heap; base of its labels; cost of the way in hand; by how much it
-is beaten, and at which cell; whether a corridor confines it; its weight; the least f taken so far.
-Of the way: its cells; where the next window begins; windows that made it shorter."""
+is beaten, and at which cell; whether a corridor confines it, and whether it knows what the way costs
+up to each cell; its weight; the least f taken so far. Of the way: its cells; where the next window
+begins."""
 BLOCK_SHIFT = 3
 """A corridor is made of blocks of 8 x 8 cells."""
 _WEIGHT_SHIFT = 16
@@ -73,7 +74,8 @@ def begin(start, percent, upper, run):
     base = next_base(run)
     run.state[SIZE], run.state[BASE] = 1, base
     run.state[UPPER], run.state[GAIN], run.state[MEETING] = upper, 0, -1
-    run.state[CONFINED], run.state[PERCENT], run.state[LOWEST] = 0, percent, 0
+    run.state[CONFINED], run.state[FOLLOWS] = 0, 0
+    run.state[PERCENT], run.state[LOWEST] = percent, 0
     run.label[start] = base
     run.key[0] = 0
     run.heap[0] = start
@@ -90,7 +92,7 @@ def search(cost, wall, columns, start, goal, diagonals, floor, run, budget):
     """
     # Arrays are taken out of the tuple once: inside the loop that would count references.
     state, label, key, heap, slot = run.state, run.label, run.key, run.heap, run.slot
-    prefix, mark = run.prefix, run.mark
+    prefix, mark, follows = run.prefix, run.mark, state[FOLLOWS] != 0
     rows, across = cost.size // columns, (columns + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
     base, percent, confined = state[BASE], state[PERCENT], state[CONFINED] != 0
     weight = (percent << _WEIGHT_SHIFT) // 100  # a division for every node would be felt
@@ -115,7 +117,7 @@ def search(cost, wall, columns, start, goal, diagonals, floor, run, budget):
             return FOUND, expansions
         if percent == 100:
             state[LOWEST] = max(state[LOWEST], f)
-        if prefix[node] >= base and prefix[node] - base - g > state[GAIN]:
+        if follows and prefix[node] >= base and prefix[node] - base - g > state[GAIN]:
             state[GAIN], state[MEETING] = prefix[node] - base - g, node
             upper = state[UPPER] - state[GAIN]
         # Cells off the map are walls; the orthogonal ones are read once for the diagonals.
@@ -251,6 +253,7 @@ def _replace(run, first, last, piece):
 def follow_way(cost, wall, columns, run):
     """Tell the search that has begun what the way in hand costs up to each of its cells."""
     total, base = np.int64(0), run.state[BASE]
+    run.state[FOLLOWS] = 1
     run.prefix[run.path[0]] = base
     for place in range(run.state[COUNT] - 1):
         total += way_cost(cost, wall, columns, run.path, place, place + 1)
@@ -306,6 +309,5 @@ def improve_windows(cost, wall, columns, length, diagonals, floor, run, budget):
                 piece = path_to(cost, wall, columns, start, goal, diagonals, run)
                 _replace(run, first, last, piece)
                 last = first + piece.size - 1
-                state[STEPS] += 1
         state[POSITION] = last if last == state[COUNT] - 1 else first + max(1, (last - first) // 2)
     return True, expansions

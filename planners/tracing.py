@@ -25,7 +25,7 @@ from planners.search import DIAGONAL, SPAN
 
 FRONTIER = "f8c084d5e1a0"
 
-TAUT = 4
+TAUT = 2
 """How often pins are drawn taut."""
 
 
