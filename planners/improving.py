@@ -17,10 +17,11 @@ from planners.search import CLOSED, DIAGONAL, LAST, NO_PATH, OUT_OF_BUDGET, SPAN
 FRONTIER = "f8c084d5e1a0"
 
 FOUND = 0
-SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, FOLLOWS, PERCENT, LOWEST, COUNT, POSITION = range(11)
+SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, FOLLOWS = range(7)
+PERCENT, LOWEST, COUNT, POSITION = range(7, 11)
 """State of a search: nodes in the heap; base of its labels; cost of the way in hand; by how much it
-is beaten, and at which cell; whether a corridor confines it, and whether it knows what the way costs
-up to each cell; its weight; the least f taken so far. Of the way: its cells; where the next window
+is beaten, and at which cell; whether a corridor confines it, and whether it knows the way's cost up
+to each cell; its weight; the least f taken so far. Of the way: its cells; where the next window
 begins."""
 BLOCK_SHIFT = 3
 """A corridor is made of blocks of 8 x 8 cells."""
