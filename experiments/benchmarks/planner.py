@@ -19,6 +19,7 @@ from experiments.benchmarks.planner_checks import (
 )
 from experiments.benchmarks.planner_drawing import draw
 from experiments.benchmarks.planner_races import LARGE, Problem, Race, curve, races, share_at, timed
+from experiments.benchmarks.planner_sampling import sampled
 from planners import Grid, astar, blind_quality, paper_steps, textbook_astar
 from sensing import instance, map_folder, read_map, read_scenarios
 
@@ -68,6 +69,10 @@ def measure(
     else:
         figures |= published(folder, 20 if quick else 200 if full else 50, rng)
     put_peers(figures, missing, seed, progress)
+    progress("sampling planners")
+    found, reasons = sampled(seed)
+    figures |= found
+    missing |= reasons
     progress("noisy maps")
     errors = (0.0, 0.02, 0.04, 0.1) if quick else (0.0, 0.01, 0.02, 0.04, 0.06, 0.08, 0.1)
     figures["noisy.below_exact"] = max(
