@@ -53,14 +53,20 @@ def measure(
         _scenes(figures, pool, seeds, progress)
         count = 100 if quick else 1000
         worlds: list[Outcome] = []
-        for found in pool.map(outcome, range(seed, seed + count)):
+        explained = [number < nao_worlds.EXPLAINED for number in range(count)]
+        for found in pool.map(outcome, range(seed, seed + count), explained):
             if len(worlds) % 100 == 0:
                 progress(f"worlds {len(worlds)} to {min(len(worlds) + 100, count)} of {count}")
             worlds.append(found)
     figures |= nao_worlds.figures(worlds)
     _connection(figures, reasons, seed, progress)
     _oracle(figures, reasons, range(seed, seed + 40), progress)
-    settings = {"seeds": len(seeds), "worlds": count, "not_measured": reasons}
+    settings = {
+        "seeds": len(seeds),
+        "worlds": count,
+        "worlds_explained": nao_worlds.EXPLAINED,
+        "not_measured": reasons,
+    }
     return Benchmark("nao", figures, settings, seed)
 
 
