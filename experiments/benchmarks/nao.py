@@ -42,7 +42,7 @@ def measure(
 ) -> Benchmark:
     """Measure the NAO in its scenes and in random worlds, with noise, on the work clock.
 
-    30 seeds a scene and 1,000 worlds; the quick form takes 100 of them. `full` and `maps` are not
+    30 seeds a scene and 1,000 worlds; the quick form takes 60 of them. `full` and `maps` are not
     used.
     """
     seeds = range(seed, seed + 30)
@@ -51,7 +51,7 @@ def measure(
     figures["golden.max_error_m"] = golden_error()
     with ProcessPoolExecutor(2) as pool:
         _scenes(figures, pool, seeds, progress)
-        count = 100 if quick else 1000
+        count = nao_worlds.EXPLAINED if quick else 1000
         worlds: list[Outcome] = []
         explained = [number < nao_worlds.EXPLAINED for number in range(count)]
         for found in pool.map(outcome, range(seed, seed + count), explained):
