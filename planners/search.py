@@ -27,17 +27,25 @@ UNLIMITED = 1 << 60
 # Smaller than the smallest positive step of f (5 858), so that a bucket rarely mixes values of f.
 BUCKET_SHIFT = 12
 BUCKETS = 16
-HEAD, CLOSED = -1, -2
+NOTHING, CLOSED = -1, -2
+ENTRIES = 8
+"""Entries that a node can have in the buckets at once: f rises by less than so many of them."""
 
 
 class Workspace(NamedTuple):
-    """Arrays that searches reuse; one per thread, for maps of up to `label.size` cells."""
+    """Arrays that searches reuse; one per thread, for maps of up to `label.size` cells.
+
+    The bucket search keeps the bucket of each node in `slot`, and its entries, chained in their
+    buckets, in `entry` and `behind`.
+    """
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]
     key: NDArray[np.int64]
-    after: NDArray[np.int32]
-    before: NDArray[np.int32]
+    heap: NDArray[np.int32]
+    slot: NDArray[np.int32]
+    entry: NDArray[np.int32]
+    behind: NDArray[np.int32]
     bucket: NDArray[np.int32]
 
 
@@ -54,32 +62,13 @@ def workspace(cells: int) -> Workspace:
         clock=np.zeros(1, np.int64),
         label=np.zeros(cells, np.int64),
         key=np.zeros(cells, np.int64),
-        after=np.zeros(cells, np.int32),
-        before=np.zeros(cells, np.int32),
+        heap=np.zeros(cells, np.int32),
+        slot=np.zeros(cells, np.int32),
+        entry=np.zeros(ENTRIES * cells, np.int32),
+        behind=np.zeros(ENTRIES * cells, np.int32),
         bucket=np.zeros(BUCKETS, np.int32),
     )
     return _kept.workspace
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _link(node, f, after, before, bucket):
-    head = int(bucket[(f >> BUCKET_SHIFT) & (BUCKETS - 1)])
-    after[node] = head
-    before[node] = HEAD
-    if head >= 0:
-        before[head] = node
-    bucket[(f >> BUCKET_SHIFT) & (BUCKETS - 1)] = node
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _unlink(node, f, after, before, bucket):
-    behind, ahead = int(after[node]), int(before[node])
-    if behind >= 0:
-        before[behind] = ahead
-    if ahead >= 0:
-        after[ahead] = behind
-    else:
-        bucket[(f >> BUCKET_SHIFT) & (BUCKETS - 1)] = behind
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -87,7 +76,9 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
     """A* over cells of equal cost; return (g at the goal or NO_PATH or OUT_OF_BUDGET, expansions).
 
     Label-correcting with last-in-first-out buckets: a bucket may hold several values of f, so a
-    node may be expanded twice, and a label of the goal prunes everything that cannot beat it.
+    node may be expanded twice, and a label of the goal prunes everything that cannot beat it. A
+    node whose f falls into another bucket gets another entry there, and the old one is passed over
+    when it comes up: that is twice as fast as to unlink it.
     """
     rows = cost.size // columns
     goal_row, goal_column = goal // columns, goal % columns
@@ -99,26 +90,32 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
     work.clock[0] += SPAN
     base = work.clock[0]
     # Arrays are taken out of the tuple once: inside the loop that would count references.
-    label, after, before, bucket = work.label, work.after, work.before, work.bucket
-    bucket[:] = HEAD
+    label, slot, bucket = work.label, work.slot, work.bucket
+    entry, behind = work.entry, work.behind
+    bucket[:] = NOTHING
     row, column = start // columns, start % columns
     down, across = abs(row - goal_row), abs(column - goal_column)
-    f = STRAIGHT * max(down, across) + minor * min(down, across)
-    label[start] = base
-    _link(start, f, after, before, bucket)
-    upper, expansions, opened, current = SPAN, 0, 1, f >> BUCKET_SHIFT
+    current = (STRAIGHT * max(down, across) + minor * min(down, across)) >> BUCKET_SHIFT
+    label[start], slot[start] = base, current
+    entry[0], behind[0], bucket[current & (BUCKETS - 1)] = start, NOTHING, 0
+    upper, expansions, opened, fresh, unused = SPAN, 0, 1, np.int64(1), np.int64(NOTHING)
     while opened > 0:
-        node = int(bucket[current & (BUCKETS - 1)])
-        if node < 0:
+        place = np.int64(bucket[current & (BUCKETS - 1)])
+        if place < 0:
             current += 1
             continue
         if current << BUCKET_SHIFT >= upper:
             break
-        _unlink(node, current << BUCKET_SHIFT, after, before, bucket)
-        before[node] = CLOSED
+        bucket[current & (BUCKETS - 1)] = behind[place]
+        behind[place], unused = unused, place
         opened -= 1
+        node = np.int64(entry[place])
+        if slot[node] != current:
+            continue
+        slot[node] = CLOSED
         g = base - label[node]
-        row, column = node // columns, node % columns
+        row = node // columns
+        column = node - row * columns
         down, across = row - goal_row, column - goal_column
         near, far = abs(down), abs(across)
         if near > far:
@@ -165,12 +162,19 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
             h = STRAIGHT * far + minor * near
             if g + step + h >= upper:
                 continue
-            if old > base - SPAN and before[there] != CLOSED:
-                _unlink(there, base - old + h, after, before, bucket)
-            else:
-                opened += 1
             label[there] = new
-            _link(there, g + step + h, after, before, bucket)
+            there_bucket = (g + step + h) >> BUCKET_SHIFT
+            if old > base - SPAN and slot[there] == there_bucket:
+                continue
+            slot[there] = there_bucket
+            if unused >= 0:
+                place, unused = unused, np.int64(behind[unused])
+            else:
+                place = fresh
+                fresh += 1
+            head = there_bucket & (BUCKETS - 1)
+            entry[place], behind[place], bucket[head] = there, bucket[head], place
+            opened += 1
         if label[goal] > base - SPAN:
             upper = base - label[goal]
     if upper == SPAN:

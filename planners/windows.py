@@ -44,7 +44,7 @@ def window_search(cost, wall, columns, start, target, box, diagonals, percent, f
     top, left, bottom, right = box
     goal_top, goal_left, goal_bottom, goal_right = target
     base = next_base(work)
-    label, key, heap, slot = work.label, work.key, work.after, work.before
+    label, key, heap, slot = work.label, work.key, work.heap, work.slot
     label[start] = base
     key[start] = 0
     heap[0] = start
