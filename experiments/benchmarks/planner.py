@@ -49,7 +49,7 @@ def measure(
     missing: dict[str, str] = {}
     rng = np.random.default_rng(seed)
     _put_paper(figures, 200 if full else _COUNT if quick else 60, 5 if quick else 11, seed, rng)
-    folder, per_map = maps or map_folder(), 8 if quick else 60 if full else 20
+    folder, per_map = maps or map_folder(), 10 if quick else 60 if full else 20
     raced = _race_all(quick, folder, per_map, seed, progress)
     for key, found in raced.items():
         if not found:
@@ -149,6 +149,7 @@ def _times(key: str, found: Sequence[Race], repeats: int) -> dict[str, float | N
     """Shares of A*'s time at which the mean quality reaches .97 and .99; on maps also with what
     earlier queries on the same map have found out."""
     figures: dict[str, float | None] = {}
+    timed(found[0], repeats=1)  # loads machine code, which the races did in other processes
     tracks = [timed(each, repeats=repeats) for each in found]
     for level, name in ((0.97, "q97"), (0.99, "q99")):
         figures[f"{key}.time_{name}"] = share_at(tracks, level)
