@@ -4,7 +4,8 @@
 straight and 14 142 diagonally, times the dearest cell it sweeps; a diagonal sweeps both orthogonal
 cells, so corners are never cut. No search touches a cell outside its window.
 
-The kernels share this file because numba's cache does not see a callee change in another file.
+The kernels share this file, but for those of `planners.frontier`, because numba's cache does not
+see a callee in another file change.
 """
 
 from typing import NamedTuple

@@ -18,7 +18,16 @@ from experiments.benchmarks.planner_checks import (
     solved,
 )
 from experiments.benchmarks.planner_drawing import draw
-from experiments.benchmarks.planner_races import LARGE, Problem, Race, curve, races, share_at, timed
+from experiments.benchmarks.planner_races import (
+    ENOUGH,
+    LARGE,
+    Problem,
+    Race,
+    curve,
+    races,
+    share_at,
+    timed,
+)
 from experiments.benchmarks.planner_sampling import sampled
 from planners import Grid, astar, blind_quality, paper_steps, textbook_astar
 from sensing import instance, map_folder, read_map, read_scenarios
@@ -85,7 +94,7 @@ def measure(
     for key in _expected():
         if figures.get(key) is None:
             figures[key] = None
-            missing.setdefault(key, "not in the quick form" if quick else "no map has such a query")
+            missing.setdefault(key, _unmeasured(key, raced, folder))
     settings: dict[str, object] = {
         "instances": _COUNT,
         "noisy_errors": errors,
@@ -97,6 +106,17 @@ def measure(
         "not_measured": missing,
     }
     return Benchmark("planner", figures, settings, seed, picture=lambda path: draw(raced, path))
+
+
+def _unmeasured(key: str, raced: dict[str, list[Race]], folder: Path | None) -> str:
+    """Why a figure that is promised is not there."""
+    if not raced.get(key.rpartition(".")[0]):
+        if not key.startswith("maps."):
+            return "not in the quick form"
+        return "no map has such a query" if folder else "no folder of maps: give --maps DIR"
+    if ".time_" in key:
+        return f"not reached in {ENOUGH:g} of A*'s work, where a timed run ends"
+    return "not reached"
 
 
 def _expected() -> list[str]:

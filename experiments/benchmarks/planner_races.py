@@ -23,7 +23,7 @@ LARGE = 20_000
 _APART = 1.3  # the paper's plans are walked when the work has grown by so much
 _CHUNK = 4  # instances a worker takes at a time
 _TIMED = 0.9925  # a timed run is over when its plan is this good …
-_ENOUGH = 0.6  # … or when it has done so large a share of A*'s work
+ENOUGH = 0.6  # … or when it has done so large a share of A*'s work
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def timed(found: Race, *, repeats: int = 3, grid: Grid | None = None) -> list[tu
                 qualities.append(best.length / step.plan.length)
                 if qualities[-1] >= _TIMED:
                     break
-            if spent > _ENOUGH * found.work:
+            if spent > ENOUGH * found.work:
                 break
         ours.append(stamps)
     steps = np.median(np.array(ours), axis=0) / np.median(theirs)
