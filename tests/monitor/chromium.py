@@ -47,7 +47,9 @@ class Browser:
         assert self._process.stderr
         lines = iter(self._process.stderr.readline, "")
         address = next(line.split()[-1] for line in lines if line.startswith("DevTools listening"))
-        self._socket = connect(address, max_size=None, proxy=None)
+        # no pings: they would draw from the global generator, in a thread of their own, in the
+        # midst of other tests, and Hypothesis refuses tests in which that generator moves
+        self._socket = connect(address, max_size=None, proxy=None, ping_interval=None)
         self._count, self._session, self.errors = 0, "", list[str]()
         target = self.send("Target.createTarget", url="about:blank")["targetId"]
         self._session = self.send("Target.attachToTarget", targetId=target, flatten=True)[
