@@ -18,9 +18,10 @@ from anytime.library import ProfileLibrary
 from anytime.machines import Machine, Rate, charged_rate, stepped_rate
 from anytime.modules import Module
 from anytime.profiles import Profile, Recording
-from anytime.programs import Call, Input, Program, program_of, upstream
+from anytime.programs import Call, Input, Join, Program, makers, program_of, upstream
 from anytime.results import Change, Result
 from anytime.running import Run, execute, seed_of
+from anytime.structure import answers
 
 STRATA = 4  # runs of a consumer on one problem, at most
 CHANGES = 64  # registrations kept of one run, at most
@@ -31,6 +32,7 @@ CONTRACTS = 8  # times for which a contract module is run, each half of the next
 class _Sample:
     """One run of a call: what it registered, scored afterwards, and what it was fed with."""
 
+    module: Module
     values: tuple[Any, ...]
     changes: tuple[Change, ...]
     raw: np.ndarray
@@ -79,8 +81,9 @@ def measure(
     keys = _keys(program, listed)
     for done, (key, problem) in enumerate(zip(keys, listed, strict=True)):
         for call in program.calls:
+            told = _told(program, call, problem, key, samples)
             samples[call.label][key] = [
-                _sample(call, problem, key, fed, seconds, clock, rest, seed)
+                _sample(call, problem, key, fed, told, seconds, clock, rest, seed)
                 for fed in _feeds(call, key, samples)
             ]
         if progress is not None:
@@ -95,6 +98,7 @@ def _sample(
     problem: Any,
     key: str,
     fed: tuple[tuple[str, _Sample, int], ...],
+    told: Mapping[str, float],
     seconds: float,
     clock: Callable[[], Clock],
     rest: float,
@@ -103,7 +107,7 @@ def _sample(
     module = call.module
     by_name = {name: sample.values[index] for name, sample, index in fed}
     inputs = tuple(
-        by_name[name] if isinstance(argument, Call) else _argument(argument, problem)
+        by_name[name] if isinstance(argument, Call | Join) else _argument(argument, problem)
         for name, argument in zip(module.parameters, call.arguments, strict=True)
     )
     levels = tuple(index for *_, index in fed)
@@ -139,9 +143,32 @@ def _sample(
         chosen = np.unique(np.linspace(0, len(kept) - 1, CHANGES).round().astype(int))
         kept = [kept[i] for i in chosen]
     raw = np.array([_scored(module, value, problem, key) for value, _ in kept])
-    features = module.features(*inputs) if module.features else {}
+    features = {**(module.features(*inputs) if module.features else {}), **told}
     values, changes = tuple(value for value, _ in kept), tuple(change for _, change in kept)
-    return _Sample(values, changes, raw, fed, result, run, features)
+    return _Sample(module, values, changes, raw, fed, result, run, features)
+
+
+def _told(
+    program: Program,
+    call: Call,
+    problem: Any,
+    key: str,
+    samples: Mapping[str, Mapping[str, list[_Sample]]],
+) -> dict[str, float]:
+    """What the tests answer in the end on a problem, for a call in the arms of their branches:
+    a branch runs its arms on different problems, and their profiles tell them apart by this."""
+    told: dict[str, float] = {}
+    for join, labels, _ in answers(program):
+        if call.label not in labels:
+            continue
+        test = join.arguments[0]
+        if isinstance(test, Input):
+            told[join.label] = float(bool(_argument(test, problem)))
+            continue
+        ends = [s.values[-1] for m in makers(test) for s in samples[m.label][key] if s.values]
+        if ends:
+            told[join.label] = float(bool(ends[-1]))
+    return told
 
 
 def _in_order(results: Iterable[tuple[Any, Change]]) -> list[tuple[Any, Change]]:
@@ -189,10 +216,11 @@ def _feeds(
     for name, source in feeding.items():
         pool = [
             (name, sample, index)
-            for sample in samples[source.label][key]
+            for maker in makers(source)
+            for sample in samples[maker.label][key]
             for index in range(len(sample.values))
         ]
-        columns.append(_strata(pool, source.module))
+        columns.append(_strata(pool))
     if any(not column for column in columns):
         return []  # nothing arrived, so nothing is run: no result is never extrapolated to
     count = max(len(column) for column in columns)
@@ -206,14 +234,14 @@ def _feeds(
     ]
 
 
-def _strata(
-    pool: Sequence[tuple[str, _Sample, int]], module: Module
-) -> list[tuple[str, _Sample, int]]:
+def _strata(pool: Sequence[tuple[str, _Sample, int]]) -> list[tuple[str, _Sample, int]]:
     """At most `STRATA` results, equally spaced in achieved quality, and the last one."""
     if len(pool) <= STRATA:
         return list(pool)
-    raw = np.array([sample.raw[index] for _, sample, index in pool])
-    quality = raw if module.quality is not None else -raw
+    # A cost rises where a quality falls. Where a join mixes both, they are spaced apart.
+    quality = np.array(
+        [s.raw[i] if s.module.quality is not None else -s.raw[i] for _, s, i in pool]
+    )
     targets = np.linspace(quality.min(), quality.max(), STRATA - 1)
     nearest = [int(np.argmin(np.abs(quality - target))) for target in targets]
     return [pool[index] for index in sorted({*nearest, len(pool) - 1})]
@@ -238,11 +266,11 @@ def _library(
         for key in keys:  # where every cost is 0, or nothing arrived, any reference will do
             best.setdefault(key, 1.0)
 
-    def quality(source: Call, key: str, sample: _Sample, index: int) -> float:
+    def quality(key: str, sample: _Sample, index: int) -> float:
         raw = float(sample.raw[index])
-        if source.module.quality is not None:
+        if sample.module.quality is not None:
             return raw
-        return 1.0 if raw == 0 else min(1.0, references[source.module.name][key] / raw)
+        return 1.0 if raw == 0 else min(1.0, references[sample.module.name][key] / raw)
 
     profiles: dict[str, Profile] = {}
     rates: dict[str, Rate] = {}
@@ -250,9 +278,7 @@ def _library(
         feeding, recordings = upstream(call), []
         for key, runs in samples[call.label].items():
             for sample in runs:
-                inputs = {
-                    name: quality(feeding[name], key, fed, index) for name, fed, index in sample.fed
-                }
+                inputs = {name: quality(key, fed, index) for name, fed, index in sample.fed}
                 recordings.append(_recording(call, key, sample, inputs))
         name = call.module.name
         known = profiles.get(name)

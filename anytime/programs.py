@@ -10,15 +10,17 @@ from typing import Any, NoReturn
 
 from anytime import calling
 from anytime.errors import AnytimeError
+from anytime.joins import Rule
 from anytime.modules import Module
 
 
 class Reading:
-    """A program being read: calls of modules are collected here in the order of their making."""
+    """A program being read: its nodes are collected here in the order of their making."""
 
     def __init__(self, program: str) -> None:
         self.program = program
-        self.calls: list[Call] = []
+        self.nodes: list[Call | Join] = []
+        self.parallels: list[Parallel] = []
 
     def call(self, module: Module, arguments: tuple[object, ...]) -> Call:
         """A new call; plain arguments become constants, the label is numbered when it repeats.
@@ -31,19 +33,27 @@ class Reading:
                 f"program {self.program!r} calls {module.name} with {len(arguments)} arguments; "
                 f"it takes {len(module.parameters)}: {', '.join(module.parameters)}"
             )
-        if any(c.module.name == module.name and c.module is not module for c in self.calls):
+        calls = [node for node in self.nodes if isinstance(node, Call)]
+        if any(c.module.name == module.name and c.module is not module for c in calls):
             raise AnytimeError(
                 f"two different modules are named {module.name!r}; give one @anytime.module(name=…)"
             )
-        taken = {call.label for call in self.calls}
-        numbered = (f"{module.name}_{count}" for count in itertools.count(2))
-        label = (
-            module.name if module.name not in taken else next(n for n in numbered if n not in taken)
-        )
         nodes = tuple(a if isinstance(a, _Symbol) else Constant(a) for a in arguments)
+        label = self._label(module.name)
         made = Call(module, nodes, label)  # pyright: ignore[reportArgumentType]
-        self.calls.append(made)
+        self.nodes.append(made)
         return made
+
+    def join(self, rule: Rule, arguments: tuple[Source, ...]) -> Join:
+        """A new result made of others by a rule."""
+        made = Join(rule, arguments, self._label(rule.kind))
+        self.nodes.append(made)
+        return made
+
+    def _label(self, name: str) -> str:
+        taken = {node.label for node in self.nodes}
+        numbered = (f"{name}_{count}" for count in itertools.count(2))
+        return name if name not in taken else next(n for n in numbered if n not in taken)
 
 
 @contextmanager
@@ -78,7 +88,10 @@ class _Symbol:
         )
 
     def __bool__(self) -> NoReturn:
-        self._refuse("branches on (or negates)", "do it inside a module")
+        self._refuse(
+            "branches on (or negates)",
+            "use compiler.branch for if, all_of for and, any_of for or, or do it inside a module",
+        )
 
     def __iter__(self) -> NoReturn:
         self._refuse("iterates over", "do it inside a module")
@@ -129,24 +142,54 @@ class Call(_Symbol):
     calls are two. `label` is the module's name, numbered when the program calls it again."""
 
     module: Module
-    arguments: tuple[Input | Constant | Call, ...]
+    arguments: tuple[Input | Constant | Call | Join, ...]
     label: str
 
     def __repr__(self) -> str:
         return f"{self.label}({', '.join(map(repr, self.arguments))})"
 
 
+@dataclass(frozen=True, eq=False)
+class Join(_Symbol):
+    """A result that a rule makes of others in no time: a branch, a choice, several at once."""
+
+    rule: Rule
+    arguments: tuple[Source, ...]
+    label: str
+
+    def __repr__(self) -> str:
+        return f"{self.label}({', '.join(map(repr, self.arguments))})"
+
+
+Source = Input | Call | Join  # where a result comes from
+
+
+@dataclass(frozen=True)
+class Parallel:
+    """Results that are made at once, on so many processors; each arm's by its label."""
+
+    labels: tuple[str, ...]
+    processors: int
+
+
 @dataclass(frozen=True)
 class Program:
     """A composition of anytime modules.
 
-    inputs: names, in order; calls: every call, each after those it uses; output: the last.
+    inputs: names, in order. nodes: every call and join, each after those it uses. output: the
+    last. parallels: what is made at once.
     """
 
     name: str
     inputs: tuple[str, ...]
-    calls: tuple[Call, ...]
-    output: Call
+    nodes: tuple[Call | Join, ...]
+    output: Call | Join
+    parallels: tuple[Parallel, ...] = ()
+
+    @property
+    def calls(self) -> tuple[Call, ...]:
+        """Every call of a module, in order."""
+        return tuple(node for node in self.nodes if isinstance(node, Call))
 
     def __call__(self, *_: object, **__: object) -> NoReturn:
         raise AnytimeError(
@@ -155,7 +198,8 @@ class Program:
         )
 
     def __repr__(self) -> str:
-        return f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"
+        text = f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"
+        return text if len(text) <= 100 else f"{text[:99]}…"
 
     def call(self, label: str) -> Call:
         """The call with this label. Raises AnytimeError naming the labels there are."""
@@ -168,13 +212,22 @@ class Program:
         )
 
 
-def upstream(call: Call) -> dict[str, Call]:
-    """The calls that feed `call`, by the parameter of its module that they arrive at."""
+def upstream(call: Call) -> dict[str, Call | Join]:
+    """The nodes that feed `call`, by the parameter of its module that they arrive at."""
     return {
         name: argument
         for name, argument in zip(call.module.parameters, call.arguments, strict=True)
-        if isinstance(argument, Call)
+        if isinstance(argument, Call | Join)
     }
+
+
+def makers(node: Call | Join) -> tuple[Call, ...]:
+    """The calls whose results may arrive from a node: itself, or those that a join passes on."""
+    if isinstance(node, Call):
+        return (node,)
+    passed = (a for i, a in enumerate(node.arguments) if i not in node.rule.tests)
+    found = (maker for a in passed if not isinstance(a, Input) for maker in makers(a))
+    return tuple(dict.fromkeys(found))
 
 
 def program_of(module: Module) -> Program:

@@ -3,15 +3,28 @@
 from compiler.baselines import equal_shares, maximal, minimal
 from compiler.compiled import CompiledProgram
 from compiler.compiling import compile
+from compiler.constructs import all_of, any_of, branch, choose, loop, output, parallel
 from compiler.loading import load
+from compiler.objectives import at_least, cvar, expected, quantile
 from compiler.reading import program
 
 __all__ = [
     "CompiledProgram",
+    "all_of",
+    "any_of",
+    "at_least",
+    "branch",
+    "choose",
     "compile",
+    "cvar",
     "equal_shares",
+    "expected",
     "load",
+    "loop",
     "maximal",
     "minimal",
+    "output",
+    "parallel",
     "program",
+    "quantile",
 ]

@@ -7,23 +7,26 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from compiler import costs
 from compiler.division import expected_quality, moments_within
 from compiler.tables import Floats, Table
 
 
 def minimal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
     """MIN: every call but the last just until it has a result, the last the rest."""
-    return _rest_to_last([table.first for table in tables[:-1]], seconds)
+    return _rest_to_last(tables, [table.first for table in tables], seconds)
 
 
 def maximal_shares(tables: Sequence[Table], seconds: float) -> list[float]:
     """MAX: every call but the last until it no longer improves, the last the rest."""
-    return _rest_to_last([table.saturation for table in tables[:-1]], seconds)
+    return _rest_to_last(tables, [table.saturation for table in tables], seconds)
 
 
 def even_shares(tables: Sequence[Table], seconds: float) -> list[float]:
     """The same time for every call."""
-    return [seconds / len(tables)] * len(tables)
+    once = [float(table.rule is None) for table in tables]
+    unit = seconds / float(costs.total(tables, [np.asarray(one) for one in once]))
+    return [unit * one for one in once]
 
 
 def minimal(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
@@ -56,5 +59,6 @@ def _promised(
     return promised
 
 
-def _rest_to_last(shares: list[float], seconds: float) -> list[float]:
-    return [*shares, seconds - sum(shares)]
+def _rest_to_last(tables: Sequence[Table], shares: list[float], seconds: float) -> list[float]:
+    named = costs.stretched(tables, shares, seconds)
+    return [named.get(table.label, 0.0) for table in tables]

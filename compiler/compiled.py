@@ -16,18 +16,21 @@ from anytime.errors import AnytimeError
 from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile, Recording
-from anytime.programs import Call, Input, Program
-from anytime.results import Change, Result, Status
-from anytime.running import Run, execute
+from anytime.programs import Program, makers
+from anytime.results import Result, Status
 from compiler import baselines
+from compiler.adaptive import ceiling
+from compiler.costs import stretched
 from compiler.division import Floats, Frontier, moments_within, output_chances
+from compiler.executing import Execution, Listener, planned, status_of, unwanted
 from compiler.explaining import Advice, Explanation, advise, explain
-from compiler.guarding import Steps, guard
+from compiler.guarding import Steps
 from compiler.intervals import Interval
+from compiler.objectives import EXPECTED, Objective
+from compiler.policies import Plan, Policy
 from compiler.storing import save
 from compiler.tables import Table
 
-Listener = Callable[[str, Any, Change], None]
 QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
 
 
@@ -61,6 +64,8 @@ class CompiledProgram:
     intervals: tuple[Interval, ...]
     steps: Mapping[str, Steps]
     machine: str
+    objective: Objective = EXPECTED
+    policy: Policy | None = None
 
     @property
     def name(self) -> str:
@@ -76,8 +81,25 @@ class CompiledProgram:
         return float(self.frontier.budgets[0])
 
     def promise(self, seconds: float) -> float:
-        """Expected quality of the result for a budget; 0 below the least one."""
-        return self.frontier.promise(seconds)
+        """What the result is worth for a budget: its expected quality, unless it was compiled for
+        another objective; 0 below the least budget."""
+        plan = self._plan(seconds)
+        return plan.value if plan else self.frontier.promise(seconds)
+
+    def ceiling(self, seconds: float) -> float:
+        """What no division of this budget promises more than: the promise itself where it is
+        exact, else the value of a policy that sees what every call achieves; 1 where even that
+        is out of reach."""
+        if self.frontier.exact:
+            return self.promise(seconds)
+        bound = ceiling(self.program, self.tables, _finite(seconds), self.objective)
+        return max(self.promise(seconds), 1.0 if bound is None else bound)
+
+    def _plan(self, seconds: float) -> Plan | None:
+        """The plan of the policy for a budget, where it is worth more than the best division."""
+        plan = self.policy.plan(seconds) if self.policy else None
+        better = plan is not None and plan.value > self.frontier.promise(seconds) + 1e-9
+        return plan if better else None
 
     def allocate(self, seconds: float) -> Allocation:
         """The best division of a budget. Raises AnytimeError for one below the least."""
@@ -87,13 +109,12 @@ class CompiledProgram:
                 f"{duration(seconds)} is below the least budget of {self.name!r}, "
                 f"{duration(self.least)}"
             )
-        shares = [float(s) for s in self.frontier.shares[index]]
-        shares[-1] = seconds - sum(shares[:-1])
-        return Allocation(
-            seconds,
-            dict(zip(self.labels, shares, strict=True)),
-            float(self.frontier.promised[index]),
-        )
+        shares = self.frontier.shares[index].tolist()
+        if self.objective.timeless:
+            named = stretched(self.tables, shares, seconds)
+        else:  # more time was not worth its cost
+            named = {t.label: s for t, s in zip(self.tables, shares, strict=True) if not t.rule}
+        return Allocation(seconds, named, self.promise(seconds))
 
     @cached_property
     def profile(self) -> Profile:
@@ -134,7 +155,7 @@ class CompiledProgram:
             deadline = running.here().deadline
             return self.run(deadline=deadline.sooner(seconds), **named).value
 
-        scorer = self.program.output.module
+        scorer = makers(self.program.output)[0].module
         return Module(
             self.name,
             contract,
@@ -177,10 +198,13 @@ class CompiledProgram:
             why = f"{duration(budget)} is below the least budget, {duration(self.least)}"
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
         allocation = self.allocate(budget)
-        started = deadline.clock.now()
-        stages = self.stages(allocation.shares, deadline, inputs, rng=rng, on_result=on_result)
-        parts = dict(stages)
-        return self._composed(allocation, deadline, started, parts)
+        execution = self._execution(allocation.shares, deadline, inputs, rng, on_result)
+        plan = self._plan(budget)
+        if self.policy is not None and plan is not None:
+            execution.decide = partial(self.policy.share, self.program, plan)
+        for _ in execution.stages():
+            pass
+        return self._composed(allocation, execution)
 
     def stages(
         self,
@@ -192,68 +216,56 @@ class CompiledProgram:
         interrupted: Callable[[], bool] = lambda: False,
         on_result: Listener | None = None,
     ) -> Iterator[tuple[str, Result]]:
-        """Run call after call and yield (label, result); the end of one without a result.
+        """Run call after call and yield (label, result), until there cannot be an output any more.
 
         shares: seconds of each call, by label; the last call has all that is left. interrupted:
         asked before each step of a generator; true ends the program.
         """
-        clock = deadline.clock
-        share_ends = clock.now()
-        parts: dict[str, Result] = {}
-        for place, call in enumerate(self.program.calls):
-            last = place == len(self.program.calls) - 1
-            share_ends += shares[call.label]
-            ends = deadline.at if last else min(share_ends, deadline.at)
-            hard = deadline.at - sum(table.first for table in self.tables[place + 1 :])
-            held = None
-            if call.module.generator and not call.module.contract and not last:
-                held = guard(self.steps.get(call.module.name), ends, hard)
-            if not last and not held:
-                # A share that others have used up still leaves time for a first result.
-                ends = max(ends, min(clock.now() + self.tables[place].first, hard))
-            # A generator with a guard is held to its share by it, the others by their deadline.
-            own = Deadline(clock, hard if held else ends)
-            may_step = held or Run.may_step
-            parts[call.label], _ = execute(
-                call.module,
-                tuple(_value(argument, inputs, parts) for argument in call.arguments),
-                own,
-                rng=rng,
-                may_step=lambda run, may=may_step: not interrupted() and may(run),
-                observe=None if on_result is None else partial(on_result, call.label),
-            )
-            yield call.label, parts[call.label]
-            if not parts[call.label] or interrupted():
-                return
+        execution = self._execution(shares, deadline, inputs, rng, on_result)
+        execution.interrupted = interrupted
+        return execution.stages()
 
-    def _composed(
+    def _execution(
         self,
-        allocation: Allocation,
+        shares: Mapping[str, float],
         deadline: Deadline,
-        started: float,
-        parts: Mapping[str, Result],
-    ) -> Result:
+        inputs: Mapping[str, Any],
+        rng: np.random.Generator | None,
+        on_result: Listener | None,
+    ) -> Execution:
+        return Execution(
+            self.program,
+            {table.label: table for table in self.tables},
+            self.steps,
+            deadline,
+            inputs,
+            planned(self.tables, shares),
+            unwanted(self.program, self.tables, shares),
+            thrifty=not self.objective.timeless,
+            rng=rng,
+            on_result=on_result,
+        )
+
+    def _composed(self, allocation: Allocation, execution: Execution) -> Result:
+        deadline, parts = execution.deadline, execution.parts
         now = deadline.clock.now()
-        output = parts.get(self.program.output.label)
+        output = execution.known(self.program.output)
         fault = next((part.fault for part in parts.values() if part.fault), None)
-        complete = all(part.status is Status.COMPLETE for part in parts.values())
-        status = Status.NO_RESULT
-        if output:
-            status = Status.COMPLETE if complete else Status.INTERRUPTED
         spent = " → ".join(
             f"{label} {duration(part.elapsed)} of {duration(allocation.shares[label])}"
             for label, part in parts.items()
         )
-        if not output:
-            silent = next(label for label, part in parts.items() if not part)
+        if output is None:
+            silent = next((label for label, part in parts.items() if not part), "nothing")
             spent += f"; {silent} had no result"
+        last = parts.get(self.program.output.label)
         return Result(
-            status,
-            output.value if output else None,
+            status_of(output, parts),
+            None if output is None else output.value,
             fault,
-            now - started,
-            max(0.0, now - max(deadline.at, started)),
-            output.history if output else (),
+            now - execution.started,
+            max(0.0, now - max(deadline.at, execution.started)),
+            last.history if output is not None and last is not None else (),
             sum(part.work for part in parts.values()),
             dict(parts),
             spent,
@@ -320,12 +332,6 @@ class CompiledProgram:
         }
         below = line_chart(shares, x_label="budget [s]", y_label="share of the budget")
         return figure(above + below, repr(self))
-
-
-def _value(argument: Any, inputs: Mapping[str, Any], parts: Mapping[str, Result]) -> Any:
-    if isinstance(argument, Input):
-        return inputs[argument.name]
-    return parts[argument.label].value if isinstance(argument, Call) else argument.value
 
 
 def _check_inputs(program: Program, inputs: Mapping[str, Any]) -> None:

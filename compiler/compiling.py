@@ -9,10 +9,12 @@ from anytime.machines import Machine
 from anytime.modules import Module
 from anytime.profiles import Profile
 from anytime.programs import Program, program_of
+from compiler.adaptive import adapt, calibrations
 from compiler.compiled import CompiledProgram
 from compiler.division import divide
 from compiler.guarding import guards_of
 from compiler.intervals import intervals_of
+from compiler.objectives import EXPECTED, Objective
 from compiler.tables import tables
 
 
@@ -21,11 +23,15 @@ def compile(
     library: Mapping[str, Profile],
     *,
     machine: Machine | None = None,
+    objective: Objective = EXPECTED,
+    adaptive: bool = False,
     seed: int = 0,
 ) -> CompiledProgram:
     """Compile a program: the best division of every amount of time among its calls. [ZR93] §4.
 
     library: conditional profiles by module name. machine: compile for another machine's rates.
+    objective: what a division is chosen for, see `compiler.expected` and its like. adaptive: decide
+    each share when its call begins, by what was achieved before, where that is worth more.
     The result is a contract program with a profile of its own; the intervals of its promises are
     95 %, by bootstrap over problems.
     Raises AnytimeError for a missing or unsuitable profile, before any search.
@@ -40,12 +46,15 @@ def compile(
     if machine is not None:
         profiles = {name: profile.on(machine) for name, profile in profiles.items()}
     made = tables(program, profiles)
-    frontier = divide(made)
+    frontier = divide(made, objective)
     if not len(frontier.budgets):
         raise AnytimeError(
             f"program {program.name!r} never has a result in its profiles; measure its modules "
             "for longer"
         )
+    policy = None
+    if adaptive:
+        policy = adapt(program, made, calibrations(program, profiles), frontier, objective)
     names = {profile.machine for profile in profiles.values()}
     return CompiledProgram(
         program=program,
@@ -54,6 +63,8 @@ def compile(
         intervals=intervals_of(program, profiles, frontier, seed),
         steps=guards_of(profiles),
         machine=" and ".join(sorted(names)),
+        objective=objective,
+        policy=policy,
     )
 
 

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compiler.elimination import (
-    MIN_PLUS,
-    SUM_PRODUCT,
-    Factor,
-    cheapest_levels,
-    eliminate,
-    times_to_levels,
-)
+from anytime.errors import AnytimeError
+from anytime.joins import Several
+from compiler import costs, grouped
+from compiler.elimination import SUM_PRODUCT, Factor, cheapest_levels, eliminate, times_to_levels
+from compiler.objectives import EXPECTED, Objective
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
+Divisions = tuple[Floats, NDArray[np.intp], Floats]  # seconds [P], moments [P, n], value [P]
+ALL = 1_000_000  # divisions that are weighed at once, at most
 SWEEPS = 4  # of pairwise exchange at each budget, at most
 BUDGETS = 24  # at which programs of more than two calls are searched
 
@@ -29,12 +29,14 @@ class Frontier:
     """The divisions that are worth having: none promises as much with less time.
 
     budgets: [F] seconds in all, increasing. shares: [F, n] seconds of each call.
-    promised: [F] expected quality, increasing.
+    promised: [F] expected quality, increasing. exact: whether no division of the tables' moments
+    promises more.
     """
 
     budgets: Floats
     shares: Floats
     promised: Floats
+    exact: bool = True
 
     def index(self, seconds: float) -> int:
         """The best division for this budget; -1 when it is below the least one."""
@@ -46,39 +48,79 @@ class Frontier:
         return float(self.promised[index]) if index >= 0 else 0.0
 
 
-def divide(tables: Sequence[Table]) -> Frontier:
+def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier:
     """The frontier of a program's divisions of time. [ZR93] §4, in the inverse domain.
 
-    Over distributions and exact on the tables' moments for one and two calls, and for any number
-    where nothing is left to chance. Beyond, pairs of calls exchange their time optimally while
-    the others keep theirs, starting from the best of the (min, +) solution for mean qualities
-    and the plain divisions (MIN, MAX, equal shares), which it so never falls below.
+    Over distributions and exact on the tables' moments where all divisions can be weighed at
+    once (three calls and more), for independent results, and for any number of calls where
+    nothing is left to chance. Beyond, pairs of calls exchange their time optimally while the
+    others keep theirs, starting from the best of the (min, +) solution for mean qualities and
+    the plain divisions (MIN, MAX, equal shares), which it so never falls below.
+    Raises AnytimeError for results with deadlines of their own and a value that is not a mean.
     """
-    if len(tables) == 1:
-        values = tables[0].expected
-        return _frontier(
-            tables, tables[0].times, np.arange(len(values))[:, None], np.asarray(values)
-        )
-    if len(tables) == 2:
-        return _frontier(tables, *_pair(tables, (0, 0), 0, 1))
-    totals, moments, values = _from_mean_levels(tables)
-    if all(_certain(table) for table in tables):
-        return _frontier(tables, totals, moments, values)
-    plain = _plain(tables)
+    parts = independent(tables)
+    if parts is not None:
+        return _merged(tables, parts, objective)
+    calls = [place for place, table in enumerate(tables) if table.rule is None]
+    cells = math.prod(len(tables[place].times) for place in calls)
+    if len(calls) <= 2 or cells <= ALL:
+        fixed = [0] * len(tables)
+        return _frontier(tables, *_weighed(tables, fixed, calls, objective), objective)
+    totals, moments, values = _from_mean_levels(tables, objective)
+    if all(_certain(table) for table in tables) and objective is EXPECTED:
+        return _frontier(tables, totals, moments, values, objective)
+    plain = _plain(tables, objective)
     totals = np.concatenate([totals, plain[0]])
     moments = np.concatenate([moments, plain[1]])
     values = np.concatenate([values, plain[2]])
-    least = float(totals[values > 0].min(initial=np.inf))
-    most = float(sum(table.times[-1] for table in tables))
+    least = float(totals[values > nothing(tables, objective)].min(initial=np.inf))
+    most = float(costs.total(tables, [np.asarray(table.times[-1]) for table in tables]))
     if np.isfinite(least):
         for budget in np.geomspace(max(least, 1e-6 * most, 1e-12), max(most, 1e-12), BUDGETS):
             inside = np.flatnonzero(totals <= budget + 1e-12)
             start = moments[inside[np.argmax(values[inside])]]
-            found = _exchanged(tables, tuple(int(m) for m in start), float(budget))
+            found = _exchanged(tables, tuple(int(m) for m in start), float(budget), objective)
             totals = np.concatenate([totals, found[0]])
             moments = np.concatenate([moments, found[1]])
             values = np.concatenate([values, found[2]])
-    return _frontier(tables, totals, moments, values)
+    return replace(_frontier(tables, totals, moments, values, objective), exact=False)
+
+
+def independent(tables: Sequence[Table]) -> tuple[tuple[int, ...], ...] | None:
+    """Of a program with several results that share nothing, the places of the tables of each."""
+    output = tables[-1]
+    if not isinstance(output.rule, Several) or len(output.feeds) != len(output.rule.weights):
+        return None
+    place = {table.label: index for index, table in enumerate(tables)}
+    parts: list[set[int]] = []
+    for label in output.feeds:
+        part, pending = set[int](), [label]
+        while pending:
+            one = place[pending.pop()]
+            part.add(one)
+            pending += tables[one].feeds
+        parts.append(part)
+    arms = [{arm.group for one in part for arm in tables[one].path} for part in parts]
+    shared = any(
+        a & b or g & h
+        for (a, g), (b, h) in itertools.combinations(zip(parts, arms, strict=True), 2)
+    )
+    return None if shared else tuple(tuple(sorted(part)) for part in parts)
+
+
+def value_of(tables: Sequence[Table], moments: Sequence[int], objective: Objective) -> float:
+    """What a division is worth, in which each call ends at its moment."""
+    seconds = costs.total(
+        tables, [np.asarray(t.times[m]) for t, m in zip(tables, moments, strict=True)]
+    )
+    chances = output_chances(tables, moments)
+    return float(objective.value(chances, tables[-1].levels, seconds))
+
+
+def nothing(tables: Sequence[Table], objective: Objective) -> float:
+    """What it is worth to have no result at once."""
+    none = np.eye(len(tables[-1].levels))[0]
+    return float(objective.value(none, tables[-1].levels, np.zeros(())))
 
 
 def output_chances(tables: Sequence[Table], moments: Sequence[int]) -> Floats:
@@ -103,51 +145,89 @@ def moments_within(tables: Sequence[Table], shares: Sequence[float]) -> tuple[in
     )
 
 
-def _pair(
-    tables: Sequence[Table], fixed: Sequence[int], one: int, other: int
-) -> tuple[Floats, NDArray[np.intp], Floats]:
-    """Every pair of moments of two calls while the others keep theirs.
-
-    Returns seconds in all [P], moments [P, n], expected quality [P].
-    """
+def _weighed(
+    tables: Sequence[Table], fixed: Sequence[int], free: Sequence[int], objective: Objective
+) -> Divisions:
+    """Every division of some calls' moments while the others keep theirs."""
+    mean = objective.additive and objective.timeless
     factors: list[Factor] = []
     for place, (table, moment) in enumerate(zip(tables, fixed, strict=True)):
-        free = place in (one, other)
-        output = place == len(tables) - 1
-        chances = table.expected if output else table.chances
-        if output:
-            scope = (*table.feeds, f"time {place}") if free else table.feeds
-            factors.append(Factor(scope, chances if free else chances[..., moment]))
-        else:
-            scope = (*table.feeds, *((f"time {place}",) if free else ()), table.label)
-            factors.append(Factor(scope, chances if free else chances[..., moment, :]))
-    kept = (f"time {one}", f"time {other}")
-    values = eliminate(factors, kept, SUM_PRODUCT)[0].table
-    rows, columns = np.indices(values.shape).reshape(2, -1)
-    moments = np.tile(np.asarray(fixed, dtype=np.intp), (rows.size, 1))
-    moments[:, one], moments[:, other] = rows, columns
-    totals = sum(
-        (table.times[moments[:, place]] for place, table in enumerate(tables)),
-        start=np.zeros(rows.size),
-    )
-    return totals, moments, values.reshape(-1)
+        chances, scope = table.chances, (*table.feeds, f"time {place}", table.label)
+        if mean and place == len(tables) - 1:
+            chances = chances @ objective.worth(table.levels, np.zeros(()))
+            scope = scope[:-1]
+        if place not in free:
+            axis = len(table.feeds)
+            chances, scope = np.take(chances, moment, axis), scope[:axis] + scope[axis + 1 :]
+        factors.append(Factor(scope, chances))
+    kept = tuple(f"time {place}" for place in free)
+    result = kept if mean else (*kept, tables[-1].label)
+    values = eliminate(factors, result, SUM_PRODUCT)[0].table
+    rows = np.indices(tuple(len(tables[place].times) for place in free)).reshape(len(free), -1)
+    moments = np.tile(np.asarray(fixed, dtype=np.intp), (rows.shape[1], 1))
+    moments[:, list(free)] = rows.T
+    totals = _totals(tables, moments)
+    if mean:
+        return totals, moments, values.reshape(-1)
+    chances = values.reshape(len(totals), -1)
+    return totals, moments, objective.value(chances, tables[-1].levels, totals)
+
+
+def _totals(tables: Sequence[Table], moments: NDArray[np.intp]) -> Floats:
+    times = [table.times[moments[:, place]] for place, table in enumerate(tables)]
+    return np.broadcast_to(costs.total(tables, times), (len(moments),))
+
+
+def _merged(
+    tables: Sequence[Table], parts: Sequence[Sequence[int]], objective: Objective
+) -> Frontier:
+    """The frontier of several independent results on one processor, from those of each.
+
+    In the order of their deadlines [Boddy & Dean 1994], each ends before its own.
+    """
+    rule = tables[-1].rule
+    assert isinstance(rule, Several)
+    if not (objective.additive and objective.timeless):
+        raise AnytimeError(
+            f"{objective!r} of several independent results is not the sum of theirs; compile them "
+            "for their expected quality"
+        )
+    scale = sum(rule.weights)
+    totals, values = np.zeros(1), np.zeros(1)
+    shares, exact = np.zeros((1, len(tables))), True
+    for place in sorted(range(len(parts)), key=lambda place: rule.deadlines[place]):
+        own = divide([tables[index] for index in parts[place]], objective)
+        exact = exact and own.exact
+        budgets = np.concatenate([[0.0], own.budgets])
+        gains = np.concatenate([[0.0], own.promised]) * rule.weights[place] / scale
+        rows = np.zeros((len(budgets), len(tables)))
+        rows[1:, list(parts[place])] = own.shares
+        ends = (totals[:, None] + budgets).ravel()
+        worth = (values[:, None] + gains).ravel()
+        late = (budgets > 0) & (ends.reshape(-1, len(budgets)) > rule.deadlines[place] + 1e-12)
+        kept = _best_first(ends, np.where(late.ravel(), -np.inf, worth), -np.inf)
+        before, added = np.divmod(kept, len(budgets))
+        totals, values, shares = ends[kept], worth[kept], shares[before] + rows[added]
+    kept = values > 1e-9
+    return Frontier(totals[kept], shares[kept], values[kept], exact)
 
 
 def _exchanged(
-    tables: Sequence[Table], start: tuple[int, ...], budget: float
-) -> tuple[Floats, NDArray[np.intp], Floats]:
+    tables: Sequence[Table], start: tuple[int, ...], budget: float, objective: Objective
+) -> Divisions:
     """Divisions met while pairs of calls exchange time within the budget until none gains."""
-    best, value = start, expected_quality(tables, start)
-    met: list[tuple[Floats, NDArray[np.intp], Floats]] = []
+    best, value = start, value_of(tables, start, objective)
+    calls = [place for place, table in enumerate(tables) if table.rule is None]
+    met: list[Divisions] = []
     for _ in range(SWEEPS):
         before = value
-        for one, other in itertools.combinations(range(len(tables)), 2):
-            totals, moments, values = _pair(tables, best, one, other)
+        for pair in itertools.combinations(calls, 2):
+            totals, moments, values = _weighed(tables, best, pair, objective)
             inside = np.flatnonzero(totals <= budget + 1e-12)
             top = inside[np.argmax(values[inside])]
             if values[top] > value + 1e-12:
                 best, value = tuple(int(m) for m in moments[top]), float(values[top])
-            met.append(_undominated(totals, moments, values))
+            met.append(_undominated(totals, moments, values, -np.inf))
         if value <= before + 1e-12:
             break
     return (
@@ -157,7 +237,7 @@ def _exchanged(
     )
 
 
-def _plain(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp], Floats]:
+def _plain(tables: Sequence[Table], objective: Objective) -> Divisions:
     """MIN, MAX, and each call until it first may have a result, with every moment of the last;
     and equal shares."""
     may = [(t.chances[..., 0] < 1).reshape(-1, len(t.times)).any(axis=0) for t in tables]
@@ -166,16 +246,21 @@ def _plain(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp], Floats]:
         moments_within(tables, [table.saturation for table in tables]),
         tuple(int(there.argmax()) for there in may),
     ]
+    last = max(place for place, table in enumerate(tables) if table.rule is None)
     found: set[tuple[int, ...]]
-    found = {(*base[:-1], last) for base in bases for last in range(len(tables[-1].times))}
+    found = {
+        (*base[:last], moment, *base[last + 1 :])
+        for base in bases
+        for moment in range(len(tables[last].times))
+    }
     for share in np.unique(np.concatenate([table.times for table in tables])):
         found.add(moments_within(tables, [float(share)] * len(tables)))
     moments = np.array(sorted(found), dtype=np.intp)
-    totals = np.sum([t.times[moments[:, i]] for i, t in enumerate(tables)], axis=0)
-    return totals, moments, np.array([expected_quality(tables, row) for row in moments])
+    values = np.array([value_of(tables, row, objective) for row in moments])
+    return _totals(tables, moments), moments, values
 
 
-def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp], Floats]:
+def _from_mean_levels(tables: Sequence[Table], objective: Objective) -> Divisions:
     """Divisions that are optimal if every quality came out at its mean: (min, +) elimination."""
     factors: list[Factor] = []
     nearest: list[NDArray[np.intp]] = []
@@ -188,9 +273,9 @@ def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp]
         least = times_to_levels(level, table.times, len(table.levels))
         factors.append(Factor((*table.feeds, table.label), least))
     output = tables[-1].label
-    costs, steps = eliminate(factors, (output,), MIN_PLUS)
+    found_costs, steps = grouped.eliminate_groups(tables, factors, output)
     found: list[tuple[int, ...]] = [tuple(0 for _ in tables)]
-    for level in np.flatnonzero(np.isfinite(costs.table)):
+    for level in np.flatnonzero(np.isfinite(found_costs.table)):
         levels = cheapest_levels(steps, {output: int(level)})
         row: list[int] = []
         for table, reached in zip(tables, nearest, strict=True):
@@ -198,9 +283,8 @@ def _from_mean_levels(tables: Sequence[Table]) -> tuple[Floats, NDArray[np.intp]
             row.append(int(np.flatnonzero(reached[fed] == levels[table.label])[0]))
         found.append(tuple(row))
     moments = np.array(found, dtype=np.intp)
-    totals = np.array([sum(t.times[m] for t, m in zip(tables, row, strict=True)) for row in found])
-    values = np.array([expected_quality(tables, row) for row in found])
-    return totals, moments, values
+    values = np.array([value_of(tables, row, objective) for row in found])
+    return _totals(tables, moments), moments, values
 
 
 def _certain(table: Table) -> bool:
@@ -208,19 +292,29 @@ def _certain(table: Table) -> bool:
     return bool(((table.chances == 0) | (table.chances == 1)).all())
 
 
-def _undominated(
-    totals: Floats, moments: NDArray[np.intp], values: Floats
-) -> tuple[Floats, NDArray[np.intp], Floats]:
+def _best_first(totals: Floats, values: Floats, floor: float) -> NDArray[np.intp]:
+    """Places of the divisions worth more than `floor` and than any as fast, in order of time."""
     order = np.lexsort((-values, totals))
-    sorted_values = values[order]
-    best_before = np.concatenate([[0.0], np.maximum.accumulate(sorted_values)[:-1]])
-    kept = order[sorted_values > best_before + 1e-9]
+    ordered = values[order]
+    best_before = np.concatenate([[floor], np.maximum.accumulate(ordered)[:-1]])
+    return order[ordered > np.maximum(best_before, floor) + 1e-9]
+
+
+def _undominated(
+    totals: Floats, moments: NDArray[np.intp], values: Floats, floor: float
+) -> Divisions:
+    kept = _best_first(totals, values, floor)
     return totals[kept], moments[kept], values[kept]
 
 
 def _frontier(
-    tables: Sequence[Table], totals: Floats, moments: NDArray[np.intp], values: Floats
+    tables: Sequence[Table],
+    totals: Floats,
+    moments: NDArray[np.intp],
+    values: Floats,
+    objective: Objective,
 ) -> Frontier:
-    totals, moments, values = _undominated(totals, moments, values)
+    kept = _undominated(totals, moments, values, nothing(tables, objective))
+    totals, moments, values = kept
     shares = np.array([table.times[moments[:, i]] for i, table in enumerate(tables)]).T
     return Frontier(totals, shares.reshape(len(totals), len(tables)), values)

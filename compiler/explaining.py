@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from anytime.errors import AnytimeError
 from anytime.pictures import duration, number
+from compiler.costs import stretched
 from compiler.division import Frontier, divide
 from compiler.tables import Table
 
@@ -93,15 +94,15 @@ def explain(name: str, tables: Sequence[Table], frontier: Frontier, seconds: flo
         )
     promised = frontier.promise(seconds)
     step = 0.05 * seconds
-    shares = [float(share) for share in frontier.shares[index]]
-    shares[-1] = seconds - sum(shares[:-1])
+    shares = stretched(tables, frontier.shares[index].tolist(), seconds)
     prices = tuple(
         Price(
             table.label,
-            share,
+            shares[table.label],
             _with(tables, place, table.ahead(step), seconds, promised) - promised,
         )
-        for place, (table, share) in enumerate(zip(tables, shares, strict=True))
+        for place, table in enumerate(tables)
+        if table.rule is None
     )
     return Explanation(
         name,
@@ -119,6 +120,8 @@ def advise(name: str, tables: Sequence[Table], frontier: Frontier, seconds: floa
     promised = frontier.promise(seconds)
     changes: list[Change] = []
     for place, table in enumerate(tables):
+        if table.rule is not None:
+            continue
         value = _with(tables, place, table.faster(2.0), seconds, promised)
         changes.append(Change(table.label, "2× faster", value, value - promised))
     changes.sort(key=lambda change: -change.gain)

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 from anytime.errors import AnytimeError
+from anytime.joins import Several, Tests
 from anytime.modules import Module
-from anytime.programs import Call, Constant, Input, Program, reading
+from anytime.programs import Call, Constant, Input, Join, Program, reading
+from anytime.structure import behind, groups, in_order
+from compiler.constructs import Output, several
 
 
 def program(function: Callable[..., Any]) -> Program:
     """Read a function that calls modules into a program.
 
-    The function is called once with symbolic inputs, so it may only call modules and return the
-    result of one. Raises AnytimeError, with the place in the source, for what cannot be compiled.
+    The function is called once with symbolic inputs, so it may only call modules, join their
+    results by the constructs of this package (`branch`, `choose`, `all_of`, `any_of`, `loop`,
+    `parallel`) and return one result or a tuple of several, each perhaps as `output(…)`.
+    Raises AnytimeError, with the place in the source, for what cannot be compiled.
     """
     where = _where(function)
     if isinstance(function, Module):
@@ -27,37 +32,49 @@ def program(function: Callable[..., Any]) -> Program:
         if parameter.kind is not parameter.POSITIONAL_OR_KEYWORD:
             raise AnytimeError(f"{where}: give {parameter.name!r} as an ordinary parameter")
     names = tuple(parameter.name for parameter in parameters)
-    with reading(function.__name__) as opened:
-        try:
-            output = function(*(Input(name) for name in names))
-        except AnytimeError as error:
-            raise AnytimeError(f"{where}: {error}") from None
-    if not isinstance(output, Call):
-        raise AnytimeError(f"{where}: {_not_a_call(output)}")
-    used = _used(output)
-    for call in opened.calls:
-        if call not in used:
+    try:
+        with reading(function.__name__) as opened:
+            output: object = function(*(Input(name) for name in names))
+            if isinstance(output, tuple):
+                output = several(opened, cast("tuple[object, ...]", output))
+            elif isinstance(output, Output):
+                output = several(opened, (output,))
+        if not isinstance(output, Call | Join):
+            raise AnytimeError(_not_a_call(output))
+        used = behind(output)
+        for node in opened.nodes:
+            if node not in used:
+                raise AnytimeError(
+                    f"the result of {node!r} is never used; remove the call or use its result"
+                )
+        for call in used:
+            _check(call)
+        found = in_order(function.__name__, names, output, opened.parallels, opened.nodes)
+        groups(found)
+    except AnytimeError as error:
+        raise AnytimeError(f"{where}: {error}") from None
+    return found
+
+
+def _check(node: Call | Join) -> None:
+    """Refuse what is read well and cannot be compiled."""
+    for argument in node.arguments:
+        test = isinstance(argument, Join) and isinstance(argument.rule, Tests)
+        if test and isinstance(node, Call):
+            raise AnytimeError(f"{node.label} is called with a test, {argument!r}; use branch")
+    if isinstance(node, Join) and isinstance(node.rule, Several):
+        parts = [behind(argument) for argument in node.arguments]
+        apart = sum(map(len, parts)) == len(frozenset[Call | Join]().union(*parts))
+        if not apart and any(deadline < float("inf") for deadline in node.rule.deadlines):
             raise AnytimeError(
-                f"{where}: the result of {call!r} is never used; remove the call or use its result"
+                "results with deadlines of their own share a call; give each its own, or let one "
+                "deadline do for all"
             )
-    return Program(function.__name__, names, tuple(opened.calls), output)
-
-
-def _used(output: Call) -> set[Call]:
-    """The call that makes the output and every call that it depends on."""
-    used, pending = set[Call](), [output]
-    while pending:
-        call = pending.pop()
-        used.add(call)
-        pending += [a for a in call.arguments if isinstance(a, Call) and a not in used]
-    return used
 
 
 def _not_a_call(output: object) -> str:
     if isinstance(output, Input | Constant):
         return f"returns {output!r}, which no module makes; return the result of a module"
-    if isinstance(output, tuple):
-        return "returns several results; return one, or join them in a module"
     return f"returns {output!r}; return the result of a module"
 
 

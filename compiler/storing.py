@@ -2,32 +2,57 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 from anytime.errors import AnytimeError
 from anytime.files import Stored, write_record
-from anytime.programs import Call, Input, Program
+from anytime.joins import Best, Branch, Rule, Several, Tests, Until
+from anytime.programs import Call, Input, Join, Program
 from compiler.division import Frontier
 from compiler.guarding import Steps
 from compiler.intervals import Interval
+from compiler.objectives import Objective
+from compiler.policies import Policy
 from compiler.tables import Table
 
-SCHEMA = "anytime.schedule/1"
+SCHEMA = "anytime.schedule/2"
 
 
 class StoredArgument(Stored):
     input: str | None = None
-    call: str | None = None
+    node: str | None = None
     constant: float | int | str | bool | None = None
 
 
-class StoredCall(Stored):
+class StoredRule(Stored):
+    """A rule by its kind and what it is made with; the rest is left out."""
+
+    kind: str
+    everyone: bool | None = None
+    wrong: float | None = None
+    quality: float | None = None
+    compare: bool | None = None
+    chances: list[float] | None = None
+    weights: list[float] | None = None
+    deadlines: list[float | None] | None = None
+
+
+class StoredNode(Stored):
+    """A call of a module, or a join by a rule: one of the two is there."""
+
     label: str
-    module: str
-    parameters: list[str]
     arguments: list[StoredArgument]
+    module: str | None = None
+    parameters: list[str] | None = None
+    rule: StoredRule | None = None
+
+
+class StoredParallel(Stored):
+    labels: list[str]
+    processors: int
 
 
 class StoredTable(Stored):
@@ -45,13 +70,17 @@ class StoredSchedule(Stored):
     name: str
     inputs: list[str]
     machine: str
-    calls: list[StoredCall]
+    nodes: list[StoredNode]
+    parallels: list[StoredParallel]
+    objective: tuple[str, float]
     tables: list[StoredTable]
     budgets: list[float]
     shares: list[list[float]]
     promised: list[float]
+    exact: bool
     intervals: list[tuple[float, float, float]]
     steps: dict[str, list[list[float]]]
+    seen: dict[str, list[list[float]]] | None
 
 
 class Compiled(Protocol):
@@ -69,46 +98,90 @@ class Compiled(Protocol):
     def steps(self) -> Mapping[str, Steps]: ...
     @property
     def machine(self) -> str: ...
+    @property
+    def objective(self) -> Objective: ...
+    @property
+    def policy(self) -> Policy | None: ...
 
 
 def save(compiled: Compiled, path: Path) -> None:
-    """Write a compiled program. Raises AnytimeError for constants that no file holds."""
-    frontier = compiled.frontier
+    """Write a compiled program; of a policy, what it is made from.
+
+    Raises AnytimeError for what no file holds: a constant that is no number or text, a utility.
+    """
+    frontier, policy = compiled.frontier, compiled.policy
+    seen = None
+    if policy is not None:
+        seen = {name: [at.tolist(), is_.tolist()] for name, (at, is_) in policy.seen.items()}
+    if not compiled.objective.timeless:
+        raise AnytimeError(
+            f"{compiled.program.name!r} is compiled for a utility, a function, which a file cannot "
+            "hold; compile it where it is used"
+        )
     record = StoredSchedule(
         name=compiled.program.name,
         inputs=list(compiled.program.inputs),
         machine=compiled.machine,
-        calls=[_store_call(call) for call in compiled.program.calls],
-        tables=[_store_table(table) for table in compiled.tables],
+        nodes=[_store_node(node) for node in compiled.program.nodes],
+        parallels=[
+            StoredParallel(labels=list(p.labels), processors=p.processors)
+            for p in compiled.program.parallels
+        ],
+        objective=(compiled.objective.kind, compiled.objective.parameter),
+        tables=[_store_table(table) for table in compiled.tables if table.rule is None],
         budgets=frontier.budgets.tolist(),
         shares=frontier.shares.tolist(),
         promised=frontier.promised.tolist(),
+        exact=frontier.exact,
         intervals=[(i.seconds, i.low, i.high) for i in compiled.intervals],
         steps={name: [list(s.median), list(s.p95)] for name, s in compiled.steps.items()},
+        seen=seen,
     )
     write_record(path, SCHEMA, record)
 
 
-def _store_call(call: Call) -> StoredCall:
+def _store_node(node: Call | Join) -> StoredNode:
     arguments: list[StoredArgument] = []
-    for argument in call.arguments:
+    for argument in node.arguments:
         if isinstance(argument, Input):
             arguments.append(StoredArgument(input=argument.name))
-        elif isinstance(argument, Call):
-            arguments.append(StoredArgument(call=argument.label))
+        elif isinstance(argument, Call | Join):
+            arguments.append(StoredArgument(node=argument.label))
         elif isinstance(argument.value, float | int | str | bool | None):
             arguments.append(StoredArgument(constant=argument.value))
         else:
             raise AnytimeError(
-                f"{call!r} has a constant of type {type(argument.value).__name__}, which a file "
+                f"{node!r} has a constant of type {type(argument.value).__name__}, which a file "
                 "cannot hold; make it an input of the program"
             )
-    return StoredCall(
-        label=call.label,
-        module=call.module.name,
-        parameters=list(call.module.parameters),
+    if isinstance(node, Join):
+        return StoredNode(label=node.label, arguments=arguments, rule=_store_rule(node.rule))
+    return StoredNode(
+        label=node.label,
         arguments=arguments,
+        module=node.module.name,
+        parameters=list(node.module.parameters),
     )
+
+
+def _store_rule(rule: Rule) -> StoredRule:
+    match rule:
+        case Branch():
+            return StoredRule(
+                kind=rule.kind,
+                chances=list(rule.chances),
+                wrong=rule.wrong,
+                everyone=rule.everyone,
+            )
+        case Best():
+            return StoredRule(kind=rule.kind, compare=rule.compare)
+        case Until():
+            return StoredRule(kind=rule.kind, quality=rule.quality)
+        case Tests():
+            return StoredRule(kind=rule.kind, chances=list(rule.chances))
+        case Several():
+            deadlines = [None if math.isinf(at) else at for at in rule.deadlines]
+            return StoredRule(kind=rule.kind, weights=list(rule.weights), deadlines=deadlines)
 
 
 def _store_table(table: Table) -> StoredTable:

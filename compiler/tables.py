@@ -10,24 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from anytime.joins import Rule, Several
 from anytime.profiles import Profile
-from anytime.programs import Call, Program, upstream
+from anytime.programs import Call, Join, Program, upstream
+from anytime.structure import Arm, answers, paths
 
 Floats = NDArray[np.float64]
 LEVELS = 16  # of an intermediate result, besides "no result"
 TIMES = 96  # moments of a module at which its time may end
-JOINT = 4096  # combinations of input levels of one module, at most
+JOINT = 8192  # combinations of input levels of one node, at most
+KNOWN = np.array([0.0, 1.0])  # levels of an input that a test is: it is there and right
 
 
 @dataclass(frozen=True)
 class Table:
-    """One call: its distribution over output levels for input levels and times.
+    """One node: its distribution over output levels for input levels and times.
 
-    label, module: of the call. feeds: labels of the calls that feed it, in the order of the axes.
+    label: of the node. module: of the call; empty for a join. feeds: labels of the nodes that
+    feed it, in the order of the axes, each once.
     levels: [L] representative quality of each output level; levels[0] = 0 is "no result".
     times: [M] seconds, increasing, times[0] = 0.
     chances: [L_1, …, L_k, M, L] probability of each output level.
     first: seconds by which half of the runs have a first result.
+    path: the arms of branches and parallels that the call stands in, from the outermost in.
+    rule: of a join, which takes no time; None for a call.
     """
 
     label: str
@@ -37,6 +43,8 @@ class Table:
     times: Floats
     chances: Floats
     first: float
+    path: tuple[Arm, ...] = ()
+    rule: Rule | None = None
 
     @property
     def expected(self) -> Floats:
@@ -63,15 +71,72 @@ class Table:
 def tables(
     program: Program, profiles: Mapping[str, Profile], counts: Mapping[str, float] | None = None
 ) -> tuple[Table, ...]:
-    """A table for each call of the program, in order.
+    """A table for each node of the program, in order.
 
     counts: how often each problem counts, for the bootstrap; once each otherwise.
     Raises AnytimeError for a module without a profile or with one conditioned on other inputs.
     """
     made: dict[str, Table] = {}
-    for call in program.calls:
-        made[call.label] = _table(call, profiles, made, counts, output=call is program.output)
+    path = paths(program)
+    told: dict[str, dict[str, float]] = {call.label: {} for call in program.calls}
+    for join, labels, answer in answers(program):
+        for label in labels:
+            told[label][join.label] = float(answer)
+    for node in program.nodes:
+        if isinstance(node, Join):
+            made[node.label] = table_of(node, made, output=node is program.output)
+            continue
+        output = node is program.output
+        table = _table(node, profiles, made, counts, told[node.label], output)
+        made[node.label] = replace(table, path=path[node.label])
     return tuple(made.values())
+
+
+def table_of(join: Join, made: Mapping[str, Table], output: bool) -> Table:
+    """The table of a join: its rule, for every combination of its arguments' levels.
+
+    made: the tables of its arguments by label. An input that is a test is always there and right.
+    """
+    sources = [made.get(getattr(argument, "label", "")) for argument in join.arguments]
+    feeds = tuple(source.label for source in sources if source is not None)
+    every = [KNOWN[1:] if source is None else source.levels for source in sources]
+    shape = tuple(len(levels) for levels in every)
+    _joint(join.label, shape)
+    cells: list[tuple[tuple[int, ...], float, float | None]] = []
+    for cell in itertools.product(*(range(size) for size in shape)):
+        known = [
+            None if source is not None and level == 0 else float(levels[level])
+            for source, levels, level in zip(sources, every, cell, strict=True)
+        ]
+        cells += [(cell, chance, quality) for chance, quality in join.rule.outcome(known)]
+    there = np.array([[np.nan if quality is None else quality for *_, quality in cells]])
+    # The value of several results is their sum: coarse levels would spoil it.
+    most = (64 if output and isinstance(join.rule, Several) else 2) * LEVELS
+    levels, bins = levels_of(there, most)
+    chances = np.zeros((*shape, 1, len(levels)))
+    for (cell, chance, _), level in zip(cells, bins[0], strict=True):
+        chances[(*cell, 0, level)] += chance
+    kept = tuple(0 if source is None else slice(None) for source in sources)
+    feeds, chances = _once_each(feeds, chances[kept])
+    return Table(join.label, "", feeds, levels, np.zeros(1), chances, 0.0, rule=join.rule)
+
+
+def _once_each(feeds: tuple[str, ...], chances: Floats) -> tuple[tuple[str, ...], Floats]:
+    """Where one node feeds several inputs, they have its level together: the diagonal."""
+    for place, label in enumerate(feeds):
+        if label in feeds[:place]:
+            first = feeds.index(label)
+            diagonal = np.moveaxis(np.diagonal(chances, axis1=first, axis2=place), -1, first)
+            return _once_each(feeds[:place] + feeds[place + 1 :], diagonal)
+    return feeds, chances
+
+
+def _joint(name: str, shape: tuple[int, ...]) -> None:
+    if np.prod(shape, dtype=float) > JOINT:
+        raise AnytimeError(
+            f"{name!r} has {len(shape)} inputs from other modules, {int(np.prod(shape))} "
+            f"combinations of levels; at most {JOINT} are compiled, join some in a module"
+        )
 
 
 def _table(
@@ -79,6 +144,7 @@ def _table(
     profiles: Mapping[str, Profile],
     made: Mapping[str, Table],
     counts: Mapping[str, float] | None,
+    told: Mapping[str, float],
     output: bool,
 ) -> Table:
     name = call.module.name
@@ -97,16 +163,13 @@ def _table(
         )
     times = _moments(profile)
     qualities = profile.quality_at(times)
-    levels = _levels(qualities, 2 * LEVELS if output else LEVELS)
-    bins = _binned(qualities, levels)
+    levels, bins = levels_of(qualities, 2 * LEVELS if output else LEVELS)
     sources = [made[source.label] for source in feeding.values()]
     shape = tuple(len(source.levels) for source in sources)
-    if np.prod(shape, dtype=float) > JOINT:
-        raise AnytimeError(
-            f"{name!r} has {len(shape)} inputs from other modules, {int(np.prod(shape))} "
-            f"combinations of levels; at most {JOINT} are compiled, join some in a module"
-        )
+    _joint(name, shape)
     scale = _scale(profile, counts)
+    # Of an arm, the problems on which it is run; where no test was measured, all of them.
+    same = {name: answer for name, answer in told.items() if name in profile.features}
     chances = np.zeros((*shape, len(times), len(levels)))
     for cell in itertools.product(*(range(size) for size in shape)):
         if any(level == 0 for level in cell):
@@ -115,16 +178,15 @@ def _table(
         values = {
             parameter: float(source.levels[level])
             for parameter, source, level in zip(feeding, sources, cell, strict=True)
-        }
+        } | same
         weights = (profile.given(**values) if values else profile).weights * scale
         weights = weights / max(float(weights.sum()), 1e-300)
         for level in range(len(levels)):
             chances[(*cell, slice(None), level)] = weights @ (bins == level)
     # Ta of [ZR93] §2, moved up to one of the moments.
     first = float(times[min(int(np.searchsorted(times, profile.time_to(0.0))), len(times) - 1)])
-    return Table(
-        call.label, name, tuple(s.label for s in feeding.values()), levels, times, chances, first
-    )
+    feeds, chances = _once_each(tuple(s.label for s in feeding.values()), chances)
+    return Table(call.label, name, feeds, levels, times, chances, first)
 
 
 def _scale(profile: Profile, counts: Mapping[str, float] | None) -> Floats:
@@ -145,23 +207,19 @@ def _moments(profile: Profile) -> Floats:
     return every[np.unique(np.concatenate([spaced, evenly]).round().astype(int))]
 
 
-def _levels(qualities: Floats, count: int) -> Floats:
-    """Distinct qualities if there are few, else quantiles; before them 0 for "no result"."""
+def levels_of(qualities: Floats, count: int) -> tuple[Floats, NDArray[np.intp]]:
+    """Levels that stand for qualities, and the level of each; NaN = no result, which is level 0.
+
+    Distinct qualities if there are at most `count`, else the means of quantiles.
+    """
     values = qualities[~np.isnan(qualities)]
     if not len(values):
-        return np.array([0.0])
+        return np.array([0.0]), np.zeros(qualities.shape, dtype=np.intp)
     distinct = np.unique(values.round(9))
     if len(distinct) > count:
         edges = np.quantile(values, np.linspace(0, 1, count + 1))
         bins = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
         distinct = np.unique([values[bins == b].mean() for b in range(count) if (bins == b).any()])
-    return np.concatenate([[0.0], distinct])
-
-
-def _binned(qualities: Floats, levels: Floats) -> NDArray[np.intp]:
-    """The level nearest to each quality; 0 where there is no result."""
-    if len(levels) == 1:
-        return np.zeros(qualities.shape, dtype=np.intp)
-    middles = (levels[1:-1] + levels[2:]) / 2
+    middles = (distinct[:-1] + distinct[1:]) / 2
     nearest = 1 + np.searchsorted(middles, np.nan_to_num(qualities), side="right")
-    return np.where(np.isnan(qualities), 0, nearest)
+    return np.concatenate([[0.0], distinct]), np.where(np.isnan(qualities), 0, nearest)

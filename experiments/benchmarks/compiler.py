@@ -14,6 +14,8 @@ from compiler import CompiledProgram, compile
 from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
 from compiler.division import divide
 from compiler.tables import Table
+from experiments.benchmarks import compiler_adaptive, compiler_constructs
+from experiments.benchmarks.compiler_constructs import KINDS
 from experiments.benchmarks.figures import Benchmark
 from experiments.domains import MACHINE, Domain, cross, domain
 
@@ -58,6 +60,13 @@ def measure(
     figures["tree.count"] = trees
     figures["dag.mismatches"] = sum(_mismatch(random_program(rng, True)) for _ in range(dags))
     figures["dag.count"] = dags
+    each = 40 if quick else 400
+    progress(f"{each} programs with each construct against living every division")
+    wrong = {kind: compiler_constructs.mismatches(kind, each, seed) for kind in KINDS}
+    figures["constructs.mismatches"] = sum(wrong.values())
+    figures |= {f"constructs.{kind}": count for kind, count in wrong.items()}
+    progress("adaptive schedules on chains with bad luck")
+    figures |= compiler_adaptive.measure(3 if quick else 12, seed)
     settings = {
         "family": FAMILY,
         "size": SIZE,

@@ -548,7 +548,7 @@ def forged(content, *place, value):
 @pytest.mark.parametrize(
     ("place", "value"),
     [
-        (("calls",), []),
+        (("nodes",), []),
         (("tables",), []),
         (("budgets",), []),
         (("promised",), []),
@@ -576,10 +576,10 @@ def forged(content, *place, value):
         (("tables", 0, "module"), "other"),
         (("tables", 1, "feeds"), []),
         (("tables", 1, "feeds"), ["find"]),
-        (("calls", 1, "label"), "see"),
-        (("calls", 1, "arguments"), []),
-        (("calls", 0, "arguments", 0), {"input": None, "call": "walk", "constant": None}),
-        (("calls", 0, "arguments", 0), {"input": "nothing", "call": None, "constant": None}),
+        (("nodes", 1, "label"), "see"),
+        (("nodes", 1, "arguments"), []),
+        (("nodes", 0, "arguments", 0), {"input": None, "node": "walk", "constant": None}),
+        (("nodes", 0, "arguments", 0), {"input": "nothing", "node": None, "constant": None}),
         (("schema",), "anytime.schedule/0"),
         (("extra",), 1),
     ],

@@ -169,10 +169,6 @@ def returns_an_input(image):
     return image
 
 
-def returns_a_tuple(image, goal):
-    return see(image), see(goal)
-
-
 def returns_nothing(image):
     see(image)
 
@@ -220,7 +216,6 @@ def by_keyword(*, image):
         (calls_an_input, r"calls image, .* only modules"),
         (converts, r"computes with image"),
         (returns_an_input, r"returns image, which no module makes"),
-        (returns_a_tuple, r"returns several results"),
         (returns_nothing, r"returns None; return the result of a module"),
         (forgets_a_call, r"result of see\(goal\) is never used"),
         (gives_too_little, r"calls find with 1 arguments; it takes 2: boxes, goal"),

@@ -1,0 +1,265 @@
+"""Running a program call by call: shares that are soft, one deadline that is hard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from anytime.clocks import Clock, Deadline, WorkClock
+from anytime.joins import Known, Rule
+from anytime.programs import Call, Constant, Input, Join, Program
+from anytime.results import Change, Result, Status
+from anytime.running import Run, execute
+from anytime.structure import due, only_for
+from compiler import costs
+from compiler.guarding import Steps, guard
+from compiler.tables import Table
+
+Listener = Callable[[str, Any, Change], None]
+Shares = Callable[[str, float, Mapping[str, Known]], float]  # call, seconds left, what is known
+
+
+@dataclass
+class Execution:
+    """One run of a program in progress.
+
+    planned: for each call, seconds from the start until its share ends. unwanted: calls that are
+    not run. thrifty: whether the last call keeps to its share too. decide: in place of the plan,
+    the share of a call when it is about to start. parts: what has been run, by label.
+    """
+
+    program: Program
+    tables: Mapping[str, Table]
+    steps: Mapping[str, Steps]
+    deadline: Deadline
+    inputs: Mapping[str, Any]
+    planned: Mapping[str, float]
+    unwanted: frozenset[str]
+    thrifty: bool = False
+    rng: np.random.Generator | None = None
+    interrupted: Callable[[], bool] = lambda: False
+    on_result: Listener | None = None
+    decide: Shares | None = None
+    parts: dict[str, Result] = field(default_factory=dict[str, Result])
+
+    def __post_init__(self) -> None:
+        self.started = self.deadline.clock.now()
+        self._skipped = set(self.unwanted)
+        self._due = due(self.program)
+        self._joins = [
+            (node, only_for(self.program, node))
+            for node in self.program.nodes
+            if isinstance(node, Join)
+        ]
+        self._settle()
+
+    def stages(self) -> Iterator[tuple[str, Result]]:
+        """Run call after call and yield (label, result), until the output cannot come any more."""
+        for call in self.program.calls:
+            if not self._wanted(call):
+                continue
+            group = next((arm for arm in self.tables[call.label].path if arm.processors), None)
+            made = self._at_once(group.group) if group else self._one(call, self.deadline.clock)
+            yield from made
+            if self.interrupted() or not self._possible(self.program.output):
+                return
+
+    def known(self, node: object) -> Known | None:
+        """What there is of a node by now."""
+        if isinstance(node, Input):
+            return Known(self.inputs[node.name])
+        if isinstance(node, Constant):
+            return Known(node.value)
+        if isinstance(node, Join):
+            return node.rule.value([self.known(argument) for argument in node.arguments])
+        assert isinstance(node, Call)
+        result = self.parts.get(node.label)
+        if not result:
+            return None
+        return Known(result.value, result.history[-1].estimate if result.history else None)
+
+    def _everything(self) -> dict[str, Known]:
+        """All that is known, by label; an input's label is its name after "input"."""
+        nodes = {node.label: self.known(node) for node in self.program.nodes}
+        given = {f"input {name}": Known(value) for name, value in self.inputs.items()}
+        return given | {label: known for label, known in nodes.items() if known is not None}
+
+    def _one(self, call: Call, clock: Clock) -> list[tuple[str, Result]]:
+        found = [self.known(argument) for argument in call.arguments]
+        if any(argument is None for argument in found):
+            self._skipped.add(call.label)  # what it needs never came, or is of an arm not taken
+            return []
+        hard, ends, held = self._limits(call, clock)
+        own = Deadline(clock, hard if held else ends)
+        may_step = held or Run.may_step
+        self.parts[call.label], _ = execute(
+            call.module,
+            tuple(argument.value for argument in found if argument is not None),
+            own,
+            rng=self.rng,
+            may_step=lambda run: not self.interrupted() and may_step(run),
+            observe=None if self.on_result is None else partial(self.on_result, call.label),
+        )
+        self._settle()
+        return [(call.label, self.parts[call.label])]
+
+    def _limits(
+        self, call: Call, clock: Clock
+    ) -> tuple[float, float, Callable[[Run], bool] | None]:
+        """The latest that a call may end, the end of its share, and its guard, if it has one."""
+        now, latest = clock.now(), self.deadline.at
+        rest = [other for other in self.program.calls if other is not call and self._wanted(other)]
+        first = {other.label: self.tables[other.label].first for other in rest}
+        hard = latest - _least(self.tables, first)
+        hard = min(hard, self.started + self._due.get(call.label, np.inf))
+        if self.decide is not None:
+            ends = now + self.decide(call.label, latest - now, self._everything())
+        else:
+            ends = self.started + self.planned[call.label]
+        if not rest:
+            ends = min(ends, latest) if self.decide or self.thrifty else latest
+            return latest, min(ends, self.started + self._due.get(call.label, np.inf)), None
+        ends = min(ends, latest)
+        held = None
+        if call.module.generator and not call.module.contract:
+            held = guard(self.steps.get(call.module.name), ends, hard)
+        if not held:
+            # A share that others have used up still leaves time for a first result.
+            ends = max(ends, min(now + self.tables[call.label].first, hard))
+        # A generator with a guard is held to its share by it, the others by their deadline.
+        return hard, ends, held
+
+    def _at_once(self, group: str) -> list[tuple[str, Result]]:
+        """The arms of a parallel, each processor one after the other those that it is given."""
+        arms: dict[int, list[Call]] = {}
+        processors = 1
+        for call in self.program.calls:
+            for arm in self.tables[call.label].path:
+                if arm.group == group and self._wanted(call):
+                    arms.setdefault(arm.index, []).append(call)
+                    processors = arm.processors
+        lists = list(arms.values())
+        spent = [sum(self._share(call) for call in calls) for calls in lists]
+        clock = self.deadline.clock
+        queues = [
+            [call for arm in block for call in lists[arm]]
+            for block in costs.assignment(spent, processors)
+        ]
+        if isinstance(clock, WorkClock):
+            made: list[tuple[str, Result]] = []
+            latest = clock.now()
+            for queue in queues:  # nothing runs in threads: each has a clock that starts now
+                own = WorkClock(clock.machine, clock.now())
+                made += self._queue(queue, own)
+                latest = max(latest, own.now())
+            clock.advance(latest - clock.now())
+            return made
+        with ThreadPoolExecutor(len(queues)) as pool:
+            ran = pool.map(lambda queue: self._queue(queue, clock), queues)
+            return [pair for pairs in ran for pair in pairs]
+
+    def _queue(self, calls: Sequence[Call], clock: Clock) -> list[tuple[str, Result]]:
+        made: list[tuple[str, Result]] = []
+        for call in calls:
+            if self._wanted(call):
+                made += self._one(call, clock)
+        return made
+
+    def _share(self, call: Call) -> float:
+        return self.planned.get(call.label, 0.0)
+
+    def _wanted(self, call: Call) -> bool:
+        return call.label not in self.parts and call.label not in self._skipped
+
+    def _settle(self) -> None:
+        """Pass over what no join needs any more."""
+        for join, private in self._joins:
+            known = [self.known(argument) for argument in join.arguments]
+            for place in join.rule.unneeded(known):
+                self._skipped |= private[place] - self.parts.keys()
+
+    def _possible(self, node: object) -> bool:
+        """Whether there is, or still may be, a result of a node."""
+        if isinstance(node, Join):
+            known = [self.known(argument) for argument in node.arguments]
+            settled, tests = node.rule.unneeded(known), node.rule.tests
+            there = [
+                place in tests if place in settled else self._possible(argument)
+                for place, argument in enumerate(node.arguments)
+            ]
+            return _may_come(node.rule, there)
+        if not isinstance(node, Call):
+            return True
+        if node.label in self.parts:
+            return bool(self.parts[node.label])
+        return node.label not in self._skipped and all(map(self._possible, node.arguments))
+
+
+def unwanted(
+    program: Program, tables: Sequence[Table], shares: Mapping[str, float]
+) -> frozenset[str]:
+    """Calls that are given no time, have no result without, and are not needed for the output."""
+    found: set[str] = set()
+    for table in tables:
+        if table.rule is not None or not costs.idle(table, shares[table.label]):
+            continue
+        if _without(program, found | {table.label}):
+            found.add(table.label)
+    return frozenset(found)
+
+
+def planned(tables: Sequence[Table], shares: Mapping[str, float]) -> dict[str, float]:
+    """For each call, seconds from the start of the program until its share ends."""
+    calls = [table for table in tables if table.rule is None]
+    if not any(table.path for table in calls):
+        ends = np.cumsum([shares[table.label] for table in calls])
+        return dict(zip((table.label for table in calls), ends.tolist(), strict=True))
+    found: dict[str, float] = {}
+    for place, table in enumerate(calls):
+        before = [t for t in calls[: place + 1] if not _beside(t, table)]
+        found[table.label] = _least({t.label: t for t in before}, shares)
+    return found
+
+
+def _beside(one: Table, other: Table) -> bool:
+    """Whether two calls are in different arms of one group."""
+    arms = {arm.group: arm.index for arm in other.path}
+    return any(arms.get(arm.group, arm.index) != arm.index for arm in one.path)
+
+
+def _least(tables: Mapping[str, Table], seconds: Mapping[str, float]) -> float:
+    counted = [table for label, table in tables.items() if label in seconds]
+    if not any(table.path for table in counted):
+        return sum(seconds[table.label] for table in counted)
+    return float(costs.total(counted, [np.asarray(seconds[t.label]) for t in counted]))
+
+
+def _without(program: Program, missing: set[str]) -> bool:
+    """Whether the output may come without these calls."""
+
+    def may(node: object) -> bool:
+        if isinstance(node, Join):
+            return _may_come(node.rule, [may(argument) for argument in node.arguments])
+        if not isinstance(node, Call):
+            return True
+        return node.label not in missing and all(map(may, node.arguments))
+
+    return may(program.output)
+
+
+def _may_come(rule: Rule, there: Sequence[bool]) -> bool:
+    outcome = rule.outcome([1.0 if one else None for one in there])
+    return any(chance > 0 and quality is not None for chance, quality in outcome)
+
+
+def status_of(output: Known | None, parts: Mapping[str, Result]) -> Status:
+    """What a program has to show: complete when each part that was run is."""
+    if output is None:
+        return Status.NO_RESULT
+    complete = all(part.status is Status.COMPLETE for part in parts.values())
+    return Status.COMPLETE if complete else Status.INTERRUPTED
