@@ -79,23 +79,21 @@ def perform(
     try:
         address = naming.address(current.module.function)
         job = _job(current, address, inputs, filled, None if real else current.deadline.clock.now())
-        worker = workers.take(address, until)
+        while (worker := workers.take(address, until)) is not None:
+            run = _Isolated(current, worker, may_step)
+            try:
+                complete, fault = run.live(job, until) if real else run.live_told(job, until)
+            except BaseException:
+                workers.bury(worker)
+                raise
+            (workers.bury if run.broken else workers.give)(worker)
+            if run.begun or not run.broken:  # else it had died before
+                return complete and not current.cut, fault
     except (AnytimeError, OSError) as error:
         return False, Fault.of(error)
-    if worker is None:
-        return False, Fault("TimeoutError", "no worker process became ready in time")
-    usable = False
-    try:
-        run = _Isolated(current, worker, may_step, until)
-        complete, fault = run.live(job) if real else run.live_told(job)
-        usable = not run.broken
-        return complete and not current.cut, fault
     finally:
         current.close()
-        if usable:
-            workers.give(worker)
-        else:
-            workers.bury(worker)
+    return False, Fault("TimeoutError", "no worker process became ready in time")
 
 
 def _job(
@@ -121,23 +119,25 @@ def _job(
 class _Isolated:
     """One run in a worker process, from this side."""
 
-    def __init__(
-        self, current: Run, worker: Worker, may_step: Callable[[Run], bool], until: float
-    ) -> None:
-        self.run, self.worker, self.may_step, self.until = current, worker, may_step, until
+    def __init__(self, current: Run, worker: Worker, may_step: Callable[[Run], bool]) -> None:
+        self.run, self.worker, self.may_step = current, worker, may_step
+        self.begun = False
         self.broken = False
         self._last: bytes | None = None  # a value that was posted and not looked at
 
-    def live(self, job: bytes) -> tuple[bool, Fault | None]:
+    def live(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """In real time."""
-        from anytime.worker_process import DONE, JOB, LEAVE, POST, STOP
+        from anytime.worker_process import BEGUN, DONE, JOB, LEAVE, POST, STOP
 
         worker, deadline = self.worker, self.run.deadline
         worker.idle, worker.ends = False, deadline.at
         complete, fault = False, None
         try:
-            worker.mailbox.send(JOB, job, until=deadline.at)
+            worker.mailbox.send(JOB, job, until=until)
             while (letter := worker.receive(deadline.at)) is not None:
+                self.begun = True
+                if letter.kind == BEGUN:
+                    continue
                 if letter.kind in (DONE, LEAVE):
                     complete, fault = pickle.loads(letter.content)
                     break
@@ -152,16 +152,19 @@ class _Isolated:
             fault = self._died(error)
         return complete, self._unpacked() or fault
 
-    def live_told(self, job: bytes) -> tuple[bool, Fault | None]:
+    def live_told(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """On the caller's clock: each check-point waits for its answer."""
-        from anytime.worker_process import DONE, GO, JOB, LEAVE, POST, STOP
+        from anytime.worker_process import BEGUN, DONE, GO, JOB, LEAVE, POST, STOP
 
         worker, deadline, run = self.worker, self.run.deadline, self.run
         worker.idle = False
         complete, fault, stops = False, None, 0
         try:
-            worker.mailbox.send(JOB, job, until=self.until)
+            worker.mailbox.send(JOB, job, until=until)
             while (letter := worker.receive(time.perf_counter() + HUNG)) is not None:
+                self.begun = True
+                if letter.kind == BEGUN:
+                    continue
                 if letter.kind in (DONE, LEAVE):
                     complete, error = pickle.loads(letter.content)
                     fault = fault or error

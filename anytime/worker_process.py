@@ -29,7 +29,7 @@ from anytime.modules import Module
 from anytime.results import Fault
 from anytime.running import Run, perform
 
-READY, JOB, POST, LAST, STOP, GO, DONE, LEAVE = (bytes([code]) for code in b"RJPLSGDB")
+READY, JOB, BEGUN, POST, LAST, STOP, GO, DONE, LEAVE = (bytes([code]) for code in b"RJBPLSGDA")
 POSTED = struct.Struct("<d?dI")  # time, whether there is a value, its estimate or NaN, charges
 GRACE = 0.1  # seconds after its deadline in which a module may come to its next check-point
 _ALONE = 120.0  # seconds without an answer after which a worker takes its caller for dead
@@ -179,6 +179,7 @@ def main(descriptor: int, known: list[tuple[str, str, str]]) -> None:
             letter = mailbox.receive(math.inf)
             assert letter is not None
             if letter.kind == JOB:
+                mailbox.send(BEGUN)
                 fault, complete = _served(letter.content, mailbox, idle)
                 soiled = _left_something()
                 mailbox.send(LEAVE if soiled else DONE, pickle.dumps((complete, fault)))
