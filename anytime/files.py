@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -26,25 +27,78 @@ class Stored(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 Record = TypeVar("Record", bound=Stored)
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that a crash leaves the old one or the new one, never a mixture."""
+class Disk:
+    """The calls that writing makes of the file system; one that fails stands in for it in tests."""
+
+    def create(self, folder: Path, prefix: str) -> tuple[int, str]:
+        return tempfile.mkstemp(dir=folder, prefix=prefix, suffix=_STRAY)
+
+    def write(self, file: int, content: bytes) -> None:
+        view = memoryview(content)
+        while view:
+            view = view[os.write(file, view) :]
+
+    def sync(self, file: int) -> None:
+        os.fsync(file)
+
+    def rename(self, old: str, new: Path) -> None:
+        Path(old).chmod(0o644)
+        Path(old).replace(new)
+
+    def remove(self, path: str) -> None:
+        Path(path).unlink(missing_ok=True)
+
+    def open_folder(self, folder: Path) -> int:
+        return os.open(folder, os.O_RDONLY)
+
+
+_STRAY = ".tmp"
+
+
+def write_atomically(path: Path, content: bytes, disk: Disk = Disk()) -> None:  # noqa: B008
+    """Write a file so that a crash leaves the old one or the new one, never a mixture.
+
+    When this returns the new one is on the disk; when it raises OSError the old one stands, unless
+    the folder alone could not be synchronised.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    sweep(path.parent)
+    file, temporary = disk.create(path.parent, f".{path.name}.{os.getpid()}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
+        try:
+            disk.write(file, content)
+            disk.sync(file)
+        finally:
+            os.close(file)
+        disk.rename(temporary, path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # what stays is swept by the next to write
+            disk.remove(temporary)
         raise
-    folder = os.open(path.parent, os.O_RDONLY)
+    folder = disk.open_folder(path.parent)
     try:
-        os.fsync(folder)
+        disk.sync(folder)
     finally:
         os.close(folder)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what writers left in a folder that died before they had written."""
+    for stray in folder.glob(f".*.*{_STRAY}"):
+        writer = stray.name.removesuffix(_STRAY).split(".")[-2]
+        if writer.isdigit() and not _lives(int(writer)):
+            with contextlib.suppress(OSError):
+                stray.unlink()
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def write_record(path: Path, schema: str, record: Stored) -> None:

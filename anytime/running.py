@@ -16,6 +16,8 @@ from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
 from anytime.results import Change, Fault, Result, Status
 
+STILL = 100_000  # check-points in a row without any time passing, which no clock can ever end
+
 
 class _Stop(BaseException):
     """Raised by `register` at the deadline; only the run that it carries catches it."""
@@ -46,6 +48,7 @@ class Run:
         self.cut = False
         self._observe = observe
         self._steps = 0
+        self._still = 0
         self._last_step = self.started
         self._closed = False
 
@@ -68,6 +71,12 @@ class Run:
             self.work += 1
             self.deadline.clock.spend(self.module.name, 1.0, self._steps)
         now = self.deadline.clock.now()
+        self._still = self._still + 1 if now == self._last_step else 0
+        if self._still > STILL:
+            raise AnytimeError(
+                f"module {self.module.name!r} came to {STILL} check-points in no time; it must "
+                "charge its work, and its machine must have a rate for it"
+            )
         self.step_seconds.append(now - self._last_step)
         self._last_step = now
         self._steps += 1

@@ -84,9 +84,7 @@ def overrun_of_nothing(seconds: float = CONTRACT) -> float:
 @contextmanager
 def burning(processes: int) -> Generator[None]:
     """So many processes that do nothing but use a core."""
-    begun = [
-        subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(processes)
-    ]
+    begun = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(processes)]
     try:
         yield
     finally:
