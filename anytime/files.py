@@ -52,10 +52,11 @@ class Disk:
         return os.open(folder, os.O_RDONLY)
 
 
-_STRAY = ".tmp"
+DISK = Disk()
+_STRAY = ".tmp"  # how the name of a file ends that is not whole yet
 
 
-def write_atomically(path: Path, content: bytes, disk: Disk = Disk()) -> None:  # noqa: B008
+def write_atomically(path: Path, content: bytes, disk: Disk = DISK) -> None:
     """Write a file so that a crash leaves the old one or the new one, never a mixture.
 
     When this returns the new one is on the disk; when it raises OSError the old one stands, unless
@@ -109,8 +110,8 @@ def write_record(path: Path, schema: str, record: Stored) -> None:
     content = msgspec.to_builtins(record)
     _refuse_non_finite(content, "$", path)
     content = {"schema": schema, **content}
-    content["checksum"] = _checksum(content)
-    write_atomically(path, _layout(content).encode())
+    content["checksum"] = checksum(content)
+    write_atomically(path, laid_out(content).encode())
 
 
 def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
@@ -124,7 +125,7 @@ def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
     if content["schema"] != schema:
         raise AnytimeError(f"{path}: has schema {content['schema']!r}, needed is {schema!r}")
     stated = content.pop("checksum", None)
-    if stated != _checksum(content):
+    if stated != checksum(content):
         raise AnytimeError(f"{path}: checksum does not match; the file was cut or edited by hand")
     del content["schema"]
     try:
@@ -158,12 +159,13 @@ def read_json(path: Path) -> Any:
     return content
 
 
-def _checksum(content: Mapping[str, Any]) -> str:
+def checksum(content: Mapping[str, Any]) -> str:
+    """Of a record without its checksum."""
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
 
 
-def _layout(content: Mapping[str, Any]) -> str:
+def laid_out(content: Mapping[str, Any]) -> str:
     """One key a line, and in a list of rows one row a line, so that differences read well."""
     lines: list[str] = []
     for key in sorted(content):
