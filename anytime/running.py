@@ -16,7 +16,7 @@ from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
 from anytime.results import Change, Fault, Result, Status
 
-STILL = 100_000  # check-points in a row without any time passing, which no clock can ever end
+STILL = 20_000  # check-points in a row without any time passing, which no clock can ever end
 
 
 class _Stop(BaseException):
