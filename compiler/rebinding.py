@@ -14,8 +14,11 @@ from compiler.compiled import CompiledProgram
 def rebound(compiled: CompiledProgram, modules: Mapping[str, Module]) -> CompiledProgram:
     """The same division of time over other modules, by the names of those that they replace.
 
-    Raises AnytimeError for a module with another name or other parameters.
+    Raises AnytimeError for a module with another name or other parameters, and for a program with
+    more than calls in it (branches, loops, what runs in parallel).
     """
+    if len(compiled.program.calls) != len(compiled.program.nodes) or compiled.program.parallels:
+        raise AnytimeError(f"{compiled.name!r} has more than calls; its modules stay as they are")
     made: dict[str, Call] = {}
     for call in compiled.program.calls:
         module = modules.get(call.module.name, call.module)
