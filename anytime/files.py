@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import math
@@ -26,25 +27,79 @@ class Stored(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 Record = TypeVar("Record", bound=Stored)
 
 
-def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file so that a crash leaves the old one or the new one, never a mixture."""
+class Disk:
+    """The calls that writing makes of the file system; one that fails stands in for it in tests."""
+
+    def create(self, folder: Path, prefix: str) -> tuple[int, str]:
+        return tempfile.mkstemp(dir=folder, prefix=prefix, suffix=_STRAY)
+
+    def write(self, file: int, content: bytes) -> None:
+        view = memoryview(content)
+        while view:
+            view = view[os.write(file, view) :]
+
+    def sync(self, file: int) -> None:
+        os.fsync(file)
+
+    def rename(self, old: str, new: Path) -> None:
+        Path(old).chmod(0o644)
+        Path(old).replace(new)
+
+    def remove(self, path: str) -> None:
+        Path(path).unlink(missing_ok=True)
+
+    def open_folder(self, folder: Path) -> int:
+        return os.open(folder, os.O_RDONLY)
+
+
+DISK = Disk()
+_STRAY = ".tmp"  # how the name of a file ends that is not whole yet
+
+
+def write_atomically(path: Path, content: bytes, disk: Disk = DISK) -> None:
+    """Write a file so that a crash leaves the old one or the new one, never a mixture.
+
+    When this returns the new one is on the disk; when it raises OSError the old one stands, unless
+    the folder alone could not be synchronised.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    sweep(path.parent)
+    file, temporary = disk.create(path.parent, f".{path.name}.{os.getpid()}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
+        try:
+            disk.write(file, content)
+            disk.sync(file)
+        finally:
+            os.close(file)
+        disk.rename(temporary, path)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # what stays is swept by the next to write
+            disk.remove(temporary)
         raise
-    folder = os.open(path.parent, os.O_RDONLY)
+    folder = disk.open_folder(path.parent)
     try:
-        os.fsync(folder)
+        disk.sync(folder)
     finally:
         os.close(folder)
+
+
+def sweep(folder: Path) -> None:
+    """Remove what writers left in a folder that died before they had written."""
+    for stray in folder.glob(f".*.*{_STRAY}"):
+        writer = stray.name.removesuffix(_STRAY).split(".")[-2]
+        if writer.isdigit() and not _lives(int(writer)):
+            with contextlib.suppress(OSError):
+                stray.unlink()
+
+
+def _lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def write_record(path: Path, schema: str, record: Stored) -> None:
@@ -55,8 +110,8 @@ def write_record(path: Path, schema: str, record: Stored) -> None:
     content = msgspec.to_builtins(record)
     _refuse_non_finite(content, "$", path)
     content = {"schema": schema, **content}
-    content["checksum"] = _checksum(content)
-    write_atomically(path, _layout(content).encode())
+    content["checksum"] = checksum(content)
+    write_atomically(path, laid_out(content).encode())
 
 
 def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
@@ -70,7 +125,7 @@ def read_record(path: Path, schema: str, kind: type[Record]) -> Record:
     if content["schema"] != schema:
         raise AnytimeError(f"{path}: has schema {content['schema']!r}, needed is {schema!r}")
     stated = content.pop("checksum", None)
-    if stated != _checksum(content):
+    if stated != checksum(content):
         raise AnytimeError(f"{path}: checksum does not match; the file was cut or edited by hand")
     del content["schema"]
     try:
@@ -104,12 +159,13 @@ def read_json(path: Path) -> Any:
     return content
 
 
-def _checksum(content: Mapping[str, Any]) -> str:
+def checksum(content: Mapping[str, Any]) -> str:
+    """Of a record without its checksum."""
     canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(canonical.encode(), digest_size=16).hexdigest()
 
 
-def _layout(content: Mapping[str, Any]) -> str:
+def laid_out(content: Mapping[str, Any]) -> str:
     """One key a line, and in a list of rows one row a line, so that differences read well."""
     lines: list[str] = []
     for key in sorted(content):

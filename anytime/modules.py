@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 import inspect
+import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from anytime import calling
+from anytime import calling, naming
 from anytime.errors import AnytimeError
 
 Score = Callable[..., float]
 FILLED = ("seconds", "rng", "memory")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a worker process may take. memory: bytes beyond what an idle one has."""
+
+    memory: int = 2**30
+
+    def __post_init__(self) -> None:
+        if self.memory < 2**20:
+            raise AnytimeError(f"memory={self.memory} bytes; a module needs at least {2**20}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +39,7 @@ class Module:
     estimate: called with (result); what may be seen of its quality at run time.
     problems: called with (rng), yields problems to measure on; the command line uses it.
     features: called with the inputs; named properties of them to condition the profile on.
+    isolated: what it may take, for a module that runs in a worker process; None for the others.
     """
 
     name: str
@@ -39,6 +52,7 @@ class Module:
     problems: Callable[..., Any] | None = None
     features: Callable[..., Mapping[str, float]] | None = None
     generator: bool = False
+    isolated: Limits | None = None
 
     @property
     def contract(self) -> bool:
@@ -63,6 +77,16 @@ class Module:
             )
         return caller.call(self, arguments)
 
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[str, ...]]:
+        """Another process finds a module by its name, as it does a function."""
+        address = naming.address(self.function)
+        try:
+            if naming.found(*address) is self:
+                return naming.found, address
+        except AnytimeError as error:
+            raise pickle.PicklingError(str(error)) from None
+        raise pickle.PicklingError(f"{'.'.join(address[:2])} is not the module {self.name!r}")
+
     def __repr__(self) -> str:
         kind = "contract module" if self.contract else "module"
         return f"<{kind} {self.name}({', '.join(self.parameters)})>"
@@ -78,6 +102,7 @@ def module(
     problems: Callable[..., Any] | None = None,
     features: Callable[..., Mapping[str, float]] | None = None,
     name: str | None = None,
+    isolated: bool | Limits = False,
 ) -> Callable[[Callable[..., Any]], Module]:
     """Make an anytime module of a generator or of a function with callbacks.
 
@@ -86,6 +111,8 @@ def module(
     estimate: (result) -> [0, 1], what may be seen at run time.
     problems: (rng) -> an iterable of problems, for `anytime profile`.
     features: (*inputs) -> named numbers that tell easy inputs from hard ones.
+    isolated: run it in a worker process, so that nothing it does can hold the caller. Its inputs
+        and results are sent as pickles, what it prints is dropped, and it keeps no memory.
     Raises AnytimeError for a signature that cannot be run.
     """
     if function is not None:
@@ -104,6 +131,16 @@ def module(
             raise AnytimeError(f"module {label!r} is async; write a generator or a plain function")
         positional, filled = _signature(label, function)
         is_generator = inspect.isgeneratorfunction(function)
+        if isolated and "memory" in filled:
+            raise AnytimeError(
+                f"module {label!r} is isolated and has a memory; a worker may die at any time, so "
+                "pass in and return what is to be kept"
+            )
+        if isolated and "<locals>" in function.__qualname__:
+            raise AnytimeError(
+                f"module {label!r} is isolated; define it at the top level of a file, where a "
+                "worker process can find it by its name"
+            )
         return Module(
             label,
             function,
@@ -115,6 +152,7 @@ def module(
             problems,
             features,
             is_generator,
+            Limits() if isolated is True else isolated or None,
         )
 
     return decorate

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
 
 import numpy as np
 
-from anytime import calling
+from anytime import calling, isolation
 from anytime.clocks import Clock, Deadline, WallClock
+from anytime.collecting import undisturbed
 from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
 from anytime.results import Change, Fault, Result, Status
+
+STILL = 20_000  # check-points in a row without any time passing, which no clock can ever end
 
 
 class _Stop(BaseException):
@@ -45,6 +48,7 @@ class Run:
         self.cut = False
         self._observe = observe
         self._steps = 0
+        self._still = 0
         self._last_step = self.started
         self._closed = False
 
@@ -67,6 +71,12 @@ class Run:
             self.work += 1
             self.deadline.clock.spend(self.module.name, 1.0, self._steps)
         now = self.deadline.clock.now()
+        self._still = self._still + 1 if now == self._last_step else 0
+        if self._still > STILL:
+            raise AnytimeError(
+                f"module {self.module.name!r} came to {STILL} check-points in no time; it must "
+                "charge its work, and its machine must have a rate for it"
+            )
         self.step_seconds.append(now - self._last_step)
         self._last_step = now
         self._steps += 1
@@ -74,22 +84,43 @@ class Run:
     def record(self, value: Any) -> None:
         """Keep a result; it replaces the last."""
         estimate = self.module.estimate
-        seen = None if estimate is None else float(estimate(value))
+        self.keep(value, None if estimate is None else float(estimate(value)))
+
+    def keep(self, value: Any, seen: float | None, at: float | None = None) -> None:
+        """Keep a result with what is seen of its quality; at: when it came, now by default."""
         if seen is not None and not 0 <= seen <= 1:
             raise AnytimeError(f"estimate of {self.module.name!r} is {seen}; it must lie in [0, 1]")
-        change = Change(self.deadline.clock.now() - self.started, self.work, seen)
+        now = self.deadline.clock.now() if at is None else at
+        change = Change(now - self.started, self.work, seen)
         self.value = value
         self.history.append(change)
         if self._observe is not None:
             self._observe(value, change)
+
+    def adopt(self, at: float, charges: Sequence[float]) -> None:
+        """Take over a check-point that another process has counted, and when it was."""
+        self.charges = self.charges or bool(charges)
+        self.work += sum(charges) if self.charges else 1.0
+        self.step_seconds.append(at - self._last_step)
+        self._last_step = at
+        self._steps += 1
+
+    @property
+    def observed(self) -> bool:
+        """Whether somebody wants to see each result."""
+        return self._observe is not None
 
     def register(self, value: Any, *ignored: object) -> None:
         """Register a result; at the deadline this does not return."""
         self.check()
         self.record(value)
         if self.deadline.expired():
-            self.cut = True
-            raise _Stop(self)
+            self.stop()
+
+    def stop(self) -> NoReturn:
+        """End the run here, from within its module."""
+        self.cut = True
+        raise _Stop(self)
 
     def expired(self) -> bool:
         """Whether to stop now. Counts as a check-point."""
@@ -244,19 +275,39 @@ def execute(
     current = Run(module, deadline, observe)
     complete, fault = False, None
     if not deadline.expired():
-        try:
-            if module.generator:
-                complete = _generate(current, inputs, filled, may_step or Run.may_step)
+        how = may_step or Run.may_step
+        with undisturbed(deadline):
+            if module.isolated and not isolation.within():
+                complete, fault = isolation.perform(current, inputs, filled, how)
             else:
-                complete = _call(current, inputs, filled)
-        except _Stop as stop:
-            if stop.run is not current:
-                raise
-        except (Exception, SystemExit) as error:
-            fault = Fault.of(error)
-        finally:
-            current.close()
+                complete, fault = perform(current, inputs, filled, how)
     return _result(current, complete and not current.cut, fault), current
+
+
+def perform(
+    current: Run,
+    inputs: tuple[Any, ...],
+    filled: dict[str, Any],
+    may_step: Callable[[Run], bool],
+) -> tuple[bool, Fault | None]:
+    """Let a run's module work in this process; whether it completed, and what it raised.
+
+    Only what interrupts the user's own program, and the end of a run outside, pass through.
+    """
+    try:
+        if current.module.generator:
+            return _generate(current, inputs, filled, may_step), None
+        return _call(current, inputs, filled), None
+    except _Stop as stop:
+        if stop.run is not current:
+            raise
+        return False, None
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        return False, Fault.of(error)
+    finally:
+        current.close()
 
 
 def _generate(

@@ -13,7 +13,7 @@ from anytime.errors import AnytimeError
 if TYPE_CHECKING:
     from experiments.benchmarks.figures import Benchmark
 
-BENCHMARKS = ("planner", "compiler", "mission", "query", "nao")
+BENCHMARKS = ("planner", "compiler", "mission", "query", "nao", "deadline", "faults")
 PARTS = ("nao",)
 
 

@@ -41,12 +41,15 @@ class Crossing:
     seed: int
 
 
-def crossing(kind: str, index: int, *, reachable: bool, seed: int = 0) -> Crossing:
-    """The floor of this kind and index, 32 to 128 cells wide, with or without a way."""
+def crossing(
+    kind: str, index: int, *, reachable: bool, seed: int = 0, size: int | None = None
+) -> Crossing:
+    """The floor of this kind and index, 32 to 128 cells wide if no size is given, with or without
+    a way."""
     rng = np.random.default_rng(seed_of("crossing", kind, index, reachable, seed))
     while True:
-        size = int(rng.integers(SIZES[0], SIZES[1] + 1))
-        free = _floor(kind, size, rng)
+        cells_wide = size or int(rng.integers(SIZES[0], SIZES[1] + 1))
+        free = _floor(kind, cells_wide, rng)
         cells = np.argwhere(free)
         if len(cells) < 2:
             continue

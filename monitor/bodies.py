@@ -67,3 +67,11 @@ class Robot(Protocol):
     def picture(self) -> Mapping[str, Any]:
         """What is too large to be kept of each frame, for those who listen while it lasts."""
         ...
+
+
+class Reactive(Protocol):
+    """A robot that can go on without a plan: the rung below the last good one."""
+
+    def avoid(self, speed: float) -> None:
+        """Start towards the goal by obstacle avoidance alone, further each time in a row."""
+        ...

@@ -9,19 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from anytime.clocks import Deadline
+from anytime.clocks import Deadline, WallClock
+from anytime.collecting import settled
 from anytime.errors import AnytimeError
 from anytime.results import Fault, Result
 from compiler import CompiledProgram
 from monitor.bodies import Robot
 from monitor.endings import Ending
+from monitor.failing import Failures, is_sound, last_resort
+from monitor.interrupting import Interruption, interruptible
 from monitor.missions import Mission
 from monitor.policies import Policy
 from monitor.reports import CallRecord, Frame, Moment, Report
 from monitor.rhythms import Rhythm
 from monitor.states import Decision, Situation, State
 
-FAILURES = 3  # frames without a plan, one after the other, that end a mission
+STILL = 100  # frames in a row in which no time passes, that end a mission
+NO_PLAN = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)  # what one raises
 Listener = Callable[[Frame], None]
 
 
@@ -56,27 +60,38 @@ class Monitor:
         """
         if seed < 0:
             raise AnytimeError(f"seed is {seed}; it must be a whole number >= 0")
-        life = _Life(self, mission, robot, seed, listen)
-        fault = ""
-        try:
-            ending = life.live()
-        except KeyboardInterrupt:
-            ending = Ending.ABORTED
-        except Exception as error:
-            ending, fault = Ending.INTERNAL, str(Fault.of(error))
-        with contextlib.suppress(Exception):  # a robot that cannot even stop ends the mission too
-            robot.stop()
-        return life.report(ending, fault)
+        with interruptible() as told, settled(isinstance(robot.clock, WallClock)):
+            life = _Life(self, mission, robot, seed, listen, told)
+            fault = ""
+            try:
+                ending = life.live()
+            except KeyboardInterrupt:
+                ending = Ending.ABORTED
+            except ConnectionError as error:
+                ending, fault = Ending.LINK_LOST, str(Fault.of(error))
+            except Exception as error:
+                ending, fault = Ending.INTERNAL, str(Fault.of(error))
+            with contextlib.suppress(Exception):  # one that cannot even stop ends the mission too
+                robot.stop()
+            return life.report(ending, fault)
 
 
 class _Life:
     """A mission in progress."""
 
     def __init__(
-        self, monitor: Monitor, mission: Mission, robot: Robot, seed: int, listen: Listener | None
+        self,
+        monitor: Monitor,
+        mission: Mission,
+        robot: Robot,
+        seed: int,
+        listen: Listener | None,
+        told: Interruption,
     ) -> None:
         self.monitor, self.mission, self.robot, self.seed = monitor, mission, robot, seed
-        self.listen = listen
+        self.listen, self.told = listen, told
+        self.failures = Failures()
+        self.still = 0
         self.frames: list[Frame] = []
         self.presented = robot.clock.now()
         self.promised = float("nan")
@@ -84,10 +99,11 @@ class _Life:
 
     def live(self) -> Ending:
         plan: Any = None
-        made_on, failures = 0.0, 0
+        made_on = 0.0
         while True:
-            if plan is not None:
-                self.robot.begin(plan, self.mission.speeds[0])
+            if self.told:
+                return Ending.ABORTED
+            standing = not self.set_out(plan)
             situation = self.robot.situation()
             if situation.ending is Ending.REACHED:
                 self.robot.work(self.mission.job)
@@ -101,10 +117,46 @@ class _Life:
                 return situation.ending
             if self.time() >= self.mission.value.deadline:
                 return Ending.DEADLINE
-            plan, made_on, had_result = self.frame(plan is None, situation, made_on)
-            failures = 0 if had_result else failures + 1
-            if failures >= FAILURES:
+            if standing and self.failures.no_plan_in_sight:
                 return Ending.MODULES_FAILED
+            before = self.time()
+            plan, made_on, had_result = self.frame(standing, situation, made_on)
+            self.failures.fruitless = 0 if had_result else self.failures.fruitless + 1
+            self.still = 0 if self.time() > before else self.still + 1
+            if self.still >= STILL:
+                return Ending.BLOCKED
+
+    def set_out(self, plan: Any) -> bool:
+        """Begin to execute a plan, or to go without one when none is in sight; whether it moves.
+
+        A plan that the robot refuses is a failure of the call that made it.
+        """
+        speed = self.mission.speeds[0]
+        if plan is not None:
+            try:
+                self.robot.begin(plan, speed)
+            except NO_PLAN as error:
+                self.failures.blame(self.monitor.program.program.output.label, str(Fault.of(error)))
+            else:
+                return True
+        avoid = getattr(self.robot, "avoid", None)  # see `monitor.bodies.Reactive`
+        if not self.failures.no_plan_in_sight or avoid is None:
+            return False
+        avoid(speed)
+        return True
+
+    def decide(self, state: State) -> Decision:
+        """The policy's decision; the one before, or the last resort, when it has none."""
+        try:
+            decision = self.monitor.decide(state)
+            if is_sound(decision):
+                return decision
+            reason = "its times or its speed are no finite numbers"
+        except Exception as error:
+            reason = str(Fault.of(error))
+        self.failures.note(f"the policy {self.monitor.name} failed: {reason}")
+        before = state.contract or (self.frames[-1].decision if self.frames else None)
+        return before or last_resort(self.monitor.program, self.mission)
 
     def time(self) -> float:
         """Seconds since the task was presented."""
@@ -117,12 +169,12 @@ class _Life:
         seconds of sensing behind it, and whether the modules had a result."""
         started, energy, driven = self.time(), situation.energy, self.robot.driven()
         state = State("frame", started, situation, standing, made_on, frame_started=started)
-        decision = self.monitor.decide(state)
+        decision = self.decide(state)
         if not self.frames:
             self.promised = decision.why.net if decision.why.curve else float("nan")
         moments = [Moment(started, "frame", decision)]
         self.robot.change_speed(decision.speed)
-        last_frame = not standing and situation.to_go <= 0
+        last_frame = not standing and (situation.to_go <= 0 or self.failures.quarantined)
         results: dict[str, Result] = {}
         records: list[CallRecord] = []
         if not last_frame:
@@ -146,15 +198,28 @@ class _Life:
                 story=self.robot.story(),
             )
         )
-        if self.listen is not None:
-            story = {**self.frames[-1].story, **self.robot.picture()}
-            self.listen(replace(self.frames[-1], story=story))
+        self.tell()
         if plan is not None:
-            self.robot.learn(plan)
+            try:
+                self.robot.learn(plan)
+            except NO_PLAN as error:
+                self.failures.blame(self.monitor.program.program.output.label, str(Fault.of(error)))
+                plan = None
         sensed = results.get(self.monitor.program.labels[0])
         usable = None if interrupted else plan
         had_result = last_frame or interrupted or plan is not None
         return usable, sensed.elapsed if sensed else 0.0, had_result
+
+    def tell(self) -> None:
+        """Tell the listener of the frame that is over; one that fails is told no more."""
+        if self.listen is None:
+            return
+        try:
+            story = {**self.frames[-1].story, **self.robot.picture()}
+            self.listen(replace(self.frames[-1], story=story))
+        except Exception as error:
+            self.listen = None
+            self.failures.note(f"who listened failed: {Fault.of(error)}")
 
     def think(
         self,
@@ -165,19 +230,49 @@ class _Life:
         records: list[CallRecord],
     ) -> None:
         """Run the program for its contract, deciding again after each call."""
+        try:
+            self.think_freely(state, decision, moments, results, records)
+        except KeyboardInterrupt:  # of the user, or of a module that has no right to it
+            if self.told or not self.told.hears:
+                raise
+            self.failures.blame(self.at_work(results), "KeyboardInterrupt")
+
+    def at_work(self, results: Mapping[str, Result]) -> str:
+        """The call that has no result yet."""
+        labels = self.monitor.program.labels
+        return next((label for label in labels if label not in results), labels[-1])
+
+    def think_freely(
+        self,
+        state: State,
+        decision: Decision,
+        moments: list[Moment],
+        results: dict[str, Result],
+        records: list[CallRecord],
+    ) -> None:
         program, clock = self.monitor.program, self.robot.clock
         deadline = Deadline.after(decision.contract, clock)
         rng = np.random.default_rng([self.seed, len(self.frames)])
         began = self.time()
+        try:
+            inputs = self.robot.inputs()
+        except ConnectionError:
+            raise
+        except Exception as error:
+            self.failures.note(f"the robot senses nothing: {Fault.of(error)}")
+            return
         stages = program.stages(
             decision.shares,
             deadline,
-            self.robot.inputs(),
+            inputs,
             rng=rng,
-            interrupted=lambda: not state.standing and self.robot.situation().interrupted,
+            interrupted=lambda: (
+                bool(self.told) or (not state.standing and self.robot.situation().interrupted)
+            ),
         )
         for label, result in stages:
             results[label] = result
+            self.failures.count(label, result)
             estimate = result.history[-1].estimate if result.history else None
             advertised = self.advertised(label, results)
             records.append(
@@ -206,7 +301,7 @@ class _Life:
                 seen=estimate,
                 contract=moments[-1].decision,
             )
-            again = self.monitor.decide(now)
+            again = self.decide(now)
             if again.speed != moments[-1].decision.speed:
                 self.robot.change_speed(again.speed)
                 moments.append(Moment(began, "call", again))
@@ -237,5 +332,5 @@ class _Life:
             job=self.job,
             frames=tuple(self.frames),
             machine=self.monitor.program.machine,
-            fault=fault,
+            fault="; ".join(filter(None, (fault, *self.failures.notes))),
         )

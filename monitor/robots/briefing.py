@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,14 +12,17 @@ import numpy as np
 from anytime import ProfileLibrary, WorkClock
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
+from anytime.faults import Schedule
 from compiler import CompiledProgram, compile
+from monitor.bodies import Robot
 from monitor.calibration import calibrate, measure_rhythm
 from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
-from monitor.monitoring import Monitor
+from monitor.monitoring import Listener, Monitor
 from monitor.policies import Paper, Policy, constant
-from monitor.reports import Report
+from monitor.reports import Frame, Report
 from monitor.rhythms import Rhythm
+from monitor.robots.faulty import FaultyRobot, faulty_program
 from monitor.robots.grid import GridRobot, Scene
 from monitor.robots.grid_missions import GridMission
 from monitor.robots.navigation import navigate
@@ -101,12 +104,25 @@ class Briefing:
         )
 
     def live(
-        self, monitor: Monitor, seed: int, *, clock: Clock | None = None, log: Path | None = None
+        self,
+        monitor: Monitor,
+        seed: int,
+        *,
+        clock: Clock | None = None,
+        log: Path | None = None,
+        faults: Schedule | None = None,
     ) -> Report:
-        """Live the mission once; log: a file that is written while it goes on."""
-        robot = self.robot(clock)
+        """Live the mission once; log: a file that is written while it goes on. faults: what goes
+        wrong on the way, on purpose; those of a clock need a `FaultyClock`."""
+        robot: Robot = self.robot(clock)
+        listen: Listener = _silent
+        if faults is not None:
+            robot = FaultyRobot(robot, faults)
+            listen = robot.log
+            monitor = replace(monitor, program=faulty_program(monitor.program, faults, robot))
         if log is None:
-            return monitor.run(self.grid.mission, robot, seed=seed)
+            heard = None if faults is None else listen
+            return monitor.run(self.grid.mission, robot, seed=seed, listen=heard)
         scene = self.grid.scene
         floor = Floor(scene.free, scene.start, scene.goal, scene.radius, density=scene.density)
         with LogWriter(log) as writer:
@@ -118,7 +134,12 @@ class Briefing:
                 machine=self.program.machine,
                 floor=floor,
             )
-            report = monitor.run(self.grid.mission, robot, seed=seed, listen=writer.frame)
+
+            def told(frame: Frame) -> None:
+                listen(frame)
+                writer.frame(frame)
+
+            report = monitor.run(self.grid.mission, robot, seed=seed, listen=told)
             writer.end(report)
         return report
 
@@ -139,6 +160,10 @@ def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = No
         levels=effort.levels,
     )
     return Briefing(grid, program, rhythm or unknown, effort)
+
+
+def _silent(frame: Frame) -> None:
+    """Nobody listens."""
 
 
 def _neutral(frame: float) -> Sequence[float]:

@@ -30,6 +30,9 @@ def declare(commands: Any) -> None:
     parser.add_argument(
         "--drift", type=target, metavar="FILE", help="what a NAO learns of itself, from run to run"
     )
+    parser.add_argument(
+        "--faults", type=Path, metavar="FILE.toml", help="what goes wrong on purpose"
+    )
     parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
     parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
     parser.add_argument(
@@ -59,18 +62,26 @@ def run(options: argparse.Namespace) -> Answer:
     from importlib.resources import files
 
     from anytime import ProfileLibrary, WallClock, WorkClock
+    from anytime.faults import FaultyClock, read_schedule
     from monitor.logs import read_log
     from monitor.page import write_page
     from monitor.robots.briefing import POLICIES, brief
+    from monitor.robots.faulty import kinds_of
     from monitor.robots.grid_missions import read_mission
     from monitor.robots.nao_scenes import is_scene
 
     if is_scene(options.mission):
+        if options.faults is not None:
+            raise AnytimeError(
+                "--faults is for a grid mission; a NAO's are anytime nao-sim --fault"
+            )
         return _run_nao(options)
     if options.robot != "simulated":
         raise AnytimeError(f"--robot {options.robot} is for a NAO's scene, not for a grid mission")
     if options.drift:
         raise AnytimeError(f"--drift {options.drift} is for a NAO's scene, not for a grid mission")
+    if options.faults is not None and not options.faults.is_file():
+        raise AnytimeError(f"{options.faults}: no such file of faults")
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
     start, goal = options.start, options.goal
@@ -83,8 +94,13 @@ def run(options: argparse.Namespace) -> Answer:
         briefing = brief(grid, library)
         monitor = briefing.monitor(options.policy)
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
+    faults = None
+    if options.faults is not None:
+        faults = read_schedule(options.faults, kinds_of(briefing.program))
+        if options.clock == "work":
+            clock = FaultyClock(grid.machine, faults)
     log = options.log / "mission.jsonl"
-    report = briefing.live(monitor, options.seed, clock=clock, log=log)
+    report = briefing.live(monitor, options.seed, clock=clock, log=log, faults=faults)
     page = write_page([read_log(log)], options.log / "mission.html")
     return Answer(
         f"{report!r}\n{_wide(grid)}\nlog {log}, page {page}",

@@ -14,7 +14,9 @@ from anytime.errors import AnytimeError
 from monitor.endings import Ending
 from monitor.missions import Energy
 from monitor.states import Situation
-from planners.navigation import FramePlan, NoWay, Place, follow, travel_cost
+from planners.avoidance import Walk, walk
+from planners.multipath import MultiPath
+from planners.navigation import NO_PLAN, FramePlan, NoWay, Place, follow, travel_cost
 from planners.path_finding import Cell, astar, route
 from sensing import Belief
 from sensing.vision import Device, Sensor, Vision
@@ -87,6 +89,7 @@ class GridRobot:
         self._speed = 1.0
         self._since = clock.now()
         self._interrupted = False
+        self._avoided = 0  # times in a row that it went without a plan
         self._fruitless = 0  # frames in a row that touched no new cell
         self._ending: Ending | None = Ending.REACHED if scene.start == scene.goal else None
         self._to_go = self._route_from(scene.start)
@@ -131,7 +134,25 @@ class GridRobot:
         if isinstance(plan, NoWay):
             self._ending = Ending.UNREACHABLE
             return
+        if (plan.start, plan.goal) != (self.at(), self.scene.goal):
+            raise AnytimeError(f"a plan from {plan.start} to {plan.goal} is for another walk")
         walk = follow(self.scene.free, plan, self.cell, insist=self._fruitless)
+        self._avoided = 0
+        self._set_out(plan, walk, speed)
+
+    def avoid(self, speed: float) -> None:
+        """Walk towards the goal by obstacle avoidance alone, twice as far each time in a row."""
+        self._settle()
+        self._avoided += 1
+        leash = self.scene.frame * 2.0 ** min(self._avoided, 40)
+        goal, touched = self.scene.goal, self.belief.touched.copy()
+        cost = travel_cost(self.belief)
+        walked = walk(self.scene.free, cost, touched, NO_PLAN, self.cell, goal, leash=leash)
+        none = MultiPath(NO_PLAN, np.zeros(1, np.int32), np.zeros(0), leash, 0.0)
+        plan = FramePlan(none, self.cell, goal, goal, 0.0, self.belief)
+        self._set_out(plan, walked, speed)
+
+    def _set_out(self, plan: FramePlan, walk: Walk, speed: float) -> None:
         self._plan = self._executed = plan
         self._path = walk.cells
         steps = np.abs(np.diff(walk.cells, axis=0)).sum(axis=1)

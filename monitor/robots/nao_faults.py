@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from anytime.errors import AnytimeError
+from anytime.faults import Fault
 from monitor.robots.nao_body import LYING, Action, LinkLostError, NaoBody, Outcome, Reading
 from monitor.robots.nao_odometry import compose
 
@@ -29,26 +30,6 @@ KINDS = {
 _JUMP = (1.0, -0.5, 0.8)
 
 
-@dataclass(frozen=True)
-class Fault:
-    """Something that is wrong between two times of the body, in seconds since it was made faulty.
-
-    Raises AnytimeError for a kind that is not in `KINDS`, and for a time that cannot be.
-    """
-
-    kind: str
-    begins: float = 0.0
-    ends: float = math.inf
-
-    def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise AnytimeError(f"no fault {self.kind!r}; there are {', '.join(KINDS)}")
-        if not 0.0 <= self.begins < self.ends:
-            raise AnytimeError(
-                f"{self.kind} from {self.begins} to {self.ends} s; it must be 0 <= from < to"
-            )
-
-
 def read_fault(text: str) -> Fault:
     """A fault as KIND[:FROM[:TO]], seconds. Raises AnytimeError."""
     kind, *times = text.split(":")
@@ -56,7 +37,13 @@ def read_fault(text: str) -> Fault:
         begins, ends = [*map(float, times), *(0.0, math.inf)[len(times) :]]
     except ValueError:
         raise AnytimeError(f"{text!r} is no fault; give KIND[:FROM[:TO]] in seconds") from None
-    return Fault(kind, begins, ends)
+    return _known(Fault(kind, begins, ends))
+
+
+def _known(fault: Fault) -> Fault:
+    if fault.kind not in KINDS:
+        raise AnytimeError(f"no fault {fault.kind!r}; there are {', '.join(KINDS)}")
+    return fault
 
 
 class _FaultyAction:
@@ -94,7 +81,7 @@ class Faulty:
 
     def __init__(self, body: NaoBody, faults: Iterable[Fault] = ()) -> None:
         self.body = body
-        self._faults = tuple(faults)
+        self._faults = tuple(map(_known, faults))
         self._origin = body.now()
         self._kept: dict[str, Reading] = {}  # the first reading under a fault
 

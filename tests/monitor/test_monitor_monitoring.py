@@ -113,7 +113,7 @@ def test_a_mission_never_raises():
 
     robot = Broken(scene(), MISSION.energy, WorkClock(REFERENCE))
     report = Monitor(PROGRAM, STEADY).run(MISSION, robot)
-    assert report.ending is Ending.INTERNAL
+    assert report.ending is Ending.REACHED  # by touch alone
     assert "camera fell off" in report.fault
 
 
@@ -127,14 +127,29 @@ def test_a_robot_that_cannot_even_stop_ends_the_mission_all_the_same():
 
     robot = Lost(scene(), MISSION.energy, WorkClock(REFERENCE))
     report = Monitor(PROGRAM, STEADY).run(MISSION, robot)
-    assert report.ending is Ending.INTERNAL
+    assert report.ending is Ending.LINK_LOST
     with pytest.raises(AnytimeError, match="seed"):
         Monitor(PROGRAM, STEADY).run(MISSION, robot, seed=-1)
 
 
-def test_modules_that_never_have_a_result_end_the_mission():
-    hasty = constant(dict(zip(PROGRAM.labels, (0.0, 0.0), strict=True)), 4.0)
-    report, robot = live(scene(), policy=hasty)
+class Planned(GridRobot):
+    """A robot that goes nowhere without a plan."""
+
+    avoid = None  # type: ignore[assignment]
+
+
+HASTY = constant(dict(zip(PROGRAM.labels, (0.0, 0.0), strict=True)), 4.0)
+
+
+def test_without_a_plan_obstacle_avoidance_alone_reaches_the_goal():
+    report, robot = live(scene(), policy=HASTY)
+    assert report.ending is Ending.REACHED
+    assert robot.cell == robot.scene.goal
+
+
+def test_modules_that_never_have_a_result_end_the_mission_of_a_robot_that_needs_plans():
+    robot = Planned(scene(), MISSION.energy, WorkClock(REFERENCE))
+    report = Monitor(PROGRAM, HASTY).run(MISSION, robot)
     assert report.ending is Ending.MODULES_FAILED
     assert robot.cell == robot.scene.start
 

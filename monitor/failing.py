@@ -1,0 +1,63 @@
+"""What a mission does about failures: who failed how often, and who is asked no more."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from anytime.results import Result
+from compiler import CompiledProgram
+from monitor.missions import Mission
+from monitor.states import Decision, Why
+
+FAILURES = 3  # faults of a module in a mission, or frames in a row without a plan
+
+
+@dataclass
+class Failures:
+    """What has failed in a mission so far.
+
+    faults: by call. fruitless: frames in a row without a plan. notes: what to tell of it.
+    """
+
+    faults: dict[str, int] = field(default_factory=dict[str, int])
+    fruitless: int = 0
+    notes: list[str] = field(default_factory=list[str])
+
+    def count(self, label: str, result: Result) -> None:
+        """Take note of a call's result."""
+        if result.fault is not None:
+            self.blame(label, str(result.fault))
+
+    def blame(self, label: str, reason: str) -> None:
+        """A call has failed; the third time it is quarantined."""
+        self.faults[label] = self.faults.get(label, 0) + 1
+        if self.faults[label] == FAILURES:
+            self.note(f"{label} failed {FAILURES} times and is asked no more: {reason}")
+
+    def note(self, text: str) -> None:
+        """Keep something to tell, once."""
+        if text not in self.notes:
+            self.notes.append(text)
+
+    @property
+    def quarantined(self) -> bool:
+        """Whether a module is asked no more, so that no plan can be made."""
+        return any(count >= FAILURES for count in self.faults.values())
+
+    @property
+    def no_plan_in_sight(self) -> bool:
+        """Whether it is time to go without one."""
+        return self.quarantined or self.fruitless >= FAILURES
+
+
+def is_sound(decision: Decision) -> bool:
+    """Whether a decision can be carried out: finite times >= 0, and a speed that moves."""
+    times = decision.shares.values()
+    return all(0 <= time < math.inf for time in times) and 0 < decision.speed < math.inf
+
+
+def last_resort(program: CompiledProgram, mission: Mission) -> Decision:
+    """What is decided when nothing can be: the least time with a result, at the least speed."""
+    least = program.allocate(program.least).shares
+    return Decision(dict(least), mission.speeds[0], Why(case="last resort"))

@@ -1,0 +1,247 @@
+"""Modules in worker processes: whatever they do, the caller has the last good result in time."""
+
+import os
+import pickle
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import anytime
+from anytime import AnytimeError, Deadline, Machine, Status, WorkClock, naming
+from anytime.isolation import HUNG
+from anytime.modules import Limits
+from anytime.workers import workers
+from experiments.benchmarks import misbehaving
+from experiments.benchmarks.misbehaving import GOOD, MISBEHAVING
+
+LEFT = 30.0  # seconds that a test's contract leaves where time does not matter
+
+
+@anytime.module(isolated=True, estimate=lambda value: value / 10)
+def count(steps, *, rng):
+    for value in range(steps):
+        anytime.charge(0.5 * value)
+        yield value
+
+
+@anytime.module(isolated=True)
+def search(steps):
+    for value in range(steps):
+        anytime.register(value)
+    return "searched"
+
+
+@anytime.module(isolated=True)
+def patient():
+    asked = 0
+    while not anytime.expired():
+        asked += 1
+    return asked
+
+
+@anytime.module(isolated=True)
+def spoils(grid):
+    grid[:] = 7
+    os.chdir("/")
+    np.random.seed(3)  # noqa: NPY002
+    return int(grid.sum())
+
+
+@anytime.module(isolated=True)
+def drawn(*, rng):
+    return rng.random()
+
+
+@anytime.module(isolated=True)
+def larger(size):
+    yield np.arange(size)
+
+
+def in_process(module):
+    """The same module, run here."""
+    function = module.function
+    here = anytime.module(name=module.name, estimate=module.estimate)
+    return here(function)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _no_process_is_left():
+    yield
+    workers.close()
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def warm(module):
+    """Wait for a worker, so that a short contract is the module's own."""
+    worker = workers.take(naming.address(module.function), time.perf_counter() + LEFT)
+    assert worker is not None
+    workers.give(worker)
+
+
+# What a run gives
+
+
+def test_an_isolated_module_that_returns_in_time_is_complete():
+    result = anytime.run(count, 4, seconds=LEFT)
+    assert (result.status, result.value, result.fault) == (Status.COMPLETE, 3, None)
+    assert [change.estimate for change in result.history] == [0.0, 0.1, 0.2, 0.3]
+    assert result.work == 3.0
+
+
+def test_each_result_is_told_to_whoever_listens():
+    told = []
+    anytime.run(count, 3, seconds=LEFT, on_result=lambda value, change: told.append(value))
+    assert told == [0, 1, 2]
+
+
+def test_a_large_result_travels_as_well():
+    result = anytime.run(larger, 200_000, seconds=LEFT)
+    assert np.array_equal(result.value, np.arange(200_000))
+
+
+def test_its_randomness_is_that_of_a_run_in_process():
+    assert anytime.run(drawn, seconds=LEFT).value == anytime.run(in_process(drawn), seconds=9).value
+
+
+def test_no_time_means_stop_now():
+    assert anytime.run(count, 4, seconds=0).status is Status.NO_RESULT
+
+
+@pytest.mark.parametrize("seconds", [0.5, 1.0, 2.2, 4.0, 100.0])
+@pytest.mark.parametrize("name", ["count", "search", "patient"])
+def test_on_a_work_clock_it_is_the_run_of_this_process_bit_for_bit(name, seconds):
+    module = {"count": count, "search": search, "patient": patient}[name]
+    inputs = () if name == "patient" else (6,)
+    clocks = [WorkClock(Machine("m").with_rate(name, 0.3)) for _ in range(2)]
+    isolated, here = (
+        anytime.run(each, *inputs, deadline=Deadline.after(seconds, clock))
+        for each, clock in zip((module, in_process(module)), clocks, strict=True)
+    )
+    assert repr(isolated) == repr(here)
+    assert isolated == here
+    assert clocks[0].now() == clocks[1].now()
+
+
+# What a module may do, and what comes of it
+
+
+@pytest.mark.parametrize("name", sorted(set(MISBEHAVING) - {"leaks", "floods_heavily"}))
+def test_whatever_a_module_does_its_last_good_result_stands(name):
+    warm(MISBEHAVING[name])
+    result = anytime.run(MISBEHAVING[name], seconds=0.3)
+    assert result.value == GOOD
+    assert result.status is Status.INTERRUPTED
+    assert anytime.run(count, 2, seconds=LEFT).value == 1  # and the next module has a worker
+
+
+def test_how_a_worker_died_is_told():
+    assert "SIGSEGV" in str(anytime.run(misbehaving.crashes, seconds=LEFT).fault)
+    assert "exited with 3" in str(anytime.run(misbehaving.exits, seconds=LEFT).fault)
+
+
+def test_a_leak_ends_at_its_limit_of_memory():
+    fault = anytime.run(misbehaving.leaks, seconds=LEFT).fault
+    assert fault is not None
+    assert "MemoryError" in fault.kind
+
+
+def test_an_exception_that_is_the_users_is_a_fault_of_the_module():
+    fault = anytime.run(misbehaving.interrupts, seconds=LEFT).fault
+    assert fault is not None
+    assert fault.kind == "KeyboardInterrupt"
+
+
+def test_what_a_module_spoils_is_its_own():
+    grid, state, place = np.zeros(5), np.random.default_rng(1).random(), os.getcwd()
+    result = anytime.run(spoils, grid, seconds=LEFT)
+    assert (result.value, grid.sum(), os.getcwd()) == (35, 0.0, place)
+    assert np.random.default_rng(1).random() == state
+
+
+def test_a_module_without_progress_on_a_work_clock_is_charged_exactly_its_contract():
+    clock = WorkClock(Machine("m").with_rate("loops", 0.1))
+    clock.advance(0.3)
+    began = time.perf_counter()
+    result = anytime.run(misbehaving.loops, deadline=Deadline.after(3.0, clock))
+    assert (clock.now(), result.elapsed, result.overrun) == (3.3, 3.0, 0.0)
+    assert result.value == GOOD
+    assert result.fault is not None
+    assert time.perf_counter() - began >= HUNG
+
+
+def test_a_module_that_was_told_to_stop_and_goes_on_is_cut():
+    clock = WorkClock(Machine("m").with_rate("swallows", 0.1))
+    result = anytime.run(misbehaving.swallows, deadline=Deadline.after(1.0, clock))
+    assert result.fault is not None
+    assert "goes on" in result.fault.message
+
+
+def test_what_it_started_dies_with_it():
+    anytime.run(misbehaving.starts_others, seconds=0.3)
+    workers.close()
+    with os.popen("ps -eo args") as listed:
+        assert "sleep 30" not in listed.read()
+
+
+def test_threads_may_run_isolated_modules_at_the_same_time():
+    found = {}
+
+    def work(steps):
+        found[steps] = anytime.run(count, steps, seconds=LEFT).value
+
+    threads = [threading.Thread(target=work, args=(steps,)) for steps in (2, 3, 4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == {2: 1, 3: 2, 4: 3}
+
+
+def test_a_worker_that_is_killed_from_outside_is_replaced():
+    warm(count)
+    worker = workers.take(naming.address(count.function), time.perf_counter() + LEFT)
+    assert worker is not None
+    os.kill(worker.process.pid, signal.SIGKILL)
+    workers.give(worker)
+    assert anytime.run(count, 3, seconds=LEFT).value == 2
+
+
+# What is refused
+
+
+def test_inputs_that_cannot_be_sent_are_a_fault():
+    fault = anytime.run(count, lambda: None, seconds=LEFT).fault
+    assert fault is not None
+    assert "cannot be sent" in fault.message
+
+
+def test_a_module_that_no_other_process_can_find_is_refused_at_once():
+    with pytest.raises(AnytimeError, match="top level of a file"):
+
+        @anytime.module(isolated=True)
+        def hidden():
+            yield 1
+
+
+def test_an_isolated_module_has_no_memory():
+    with pytest.raises(AnytimeError, match="worker may die"):
+        anytime.module(isolated=True)(_remembers)
+
+
+def _remembers(*, memory):
+    yield memory
+
+
+def test_a_limit_that_nothing_fits_in_is_refused():
+    with pytest.raises(AnytimeError, match="at least"):
+        Limits(memory=10)
+
+
+def test_a_module_is_pickled_by_its_name():
+    assert pickle.loads(pickle.dumps(count)) is count
+    with pytest.raises(pickle.PicklingError):
+        pickle.dumps(in_process(count))

@@ -1,0 +1,200 @@
+"""Missions in which things go wrong on purpose: none raises, each repeats from its number."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from anytime import AnytimeError, WorkClock
+from anytime.faults import CLOCK, MODULE, Fault, FaultyClock, Schedule, read_schedule
+from experiments import crossings
+from experiments.benchmarks import faulty_missions
+from experiments.benchmarks.faulty_missions import MISSION
+from monitor import Ending, Monitor
+from monitor.policies import constant
+from monitor.robots.faulty import LOG, ROBOT, FaultyRobot, faulty_program, kinds_of
+from monitor.robots.grid import GridRobot, Scene
+from monitor.robots.grid_missions import REFERENCE, read_mission
+from sensing.random_maps import corner_to_corner, uniform
+
+PROGRAM = crossings.compiled()
+STEADY = constant(dict(zip(PROGRAM.labels, (1.0, 1.0), strict=True)), 5.0)
+
+
+def floor():
+    import numpy as np
+
+    free = uniform(40, 0.15, np.random.default_rng(5))
+    start, goal = corner_to_corner(free)
+    return Scene(free, start, goal)
+
+
+def live(*faults, seed=0):
+    schedule = Schedule(faults, seed)
+    robot = GridRobot(floor(), MISSION.energy, FaultyClock(REFERENCE, schedule))
+    faulty = FaultyRobot(robot, schedule)
+    monitor = Monitor(faulty_program(PROGRAM, schedule, faulty), STEADY, "steady")
+    return monitor.run(MISSION, faulty, listen=faulty.log)
+
+
+@pytest.mark.parametrize("what", ["see", "find_path"])
+@pytest.mark.parametrize("kind", MODULE)
+def test_whatever_a_module_does_in_a_mission_the_goal_is_reached(what, kind):
+    report = live(Fault(kind, what=what))
+    assert report.ending is Ending.REACHED
+
+
+@pytest.mark.parametrize("kind", {**ROBOT, **LOG, **CLOCK})
+def test_whatever_goes_wrong_with_the_robot_the_mission_ends_in_the_closed_set(kind):
+    what = "log" if kind in LOG else "clock" if kind in CLOCK else "robot"
+    report = live(Fault(kind, begins=3.0, ends=20.0, what=what))
+    ends = {"link": Ending.LINK_LOST}.get(kind, Ending.REACHED)
+    assert report.ending is ends
+
+
+def test_a_module_that_fails_three_times_is_asked_no_more():
+    report = live(Fault("raises", what="see"))
+    assert "see failed 3 times and is asked no more" in report.fault
+    faults = [call for frame in report.frames for call in frame.calls if call.fault]
+    assert len(faults) == 3
+
+
+def test_the_ledger_of_a_faulty_mission_closes():
+    for number in range(30):
+        outcome = faulty_missions.live(PROGRAM, faulty_missions.drawn(PROGRAM, number, 0))
+        assert outcome.raised == ""
+        assert outcome.unclosed == 0
+
+
+def test_a_faulty_mission_repeats_from_its_number():
+    for number in range(6):
+        lived = [
+            faulty_missions.live(PROGRAM, faulty_missions.drawn(PROGRAM, number, 1))
+            for _ in range(2)
+        ]
+        assert repr(lived[0].report) == repr(lived[1].report)
+
+
+def test_a_log_that_cannot_be_written_is_told_and_the_mission_goes_on():
+    report = live(Fault("full", what="log"))
+    assert report.ending is Ending.REACHED
+    assert "who listened failed" in report.fault
+
+
+def test_a_policy_that_fails_leaves_the_last_resort():
+    class Mad:
+        def __call__(self, state):
+            raise ZeroDivisionError("no idea")
+
+    robot = GridRobot(floor(), MISSION.energy, WorkClock(REFERENCE))
+    report = Monitor(PROGRAM, Mad(), "mad").run(MISSION, robot)
+    assert report.ending is Ending.REACHED
+    assert "policy mad failed" in report.fault
+
+
+def test_a_suspended_process_is_noticed_on_the_clock():
+    report = live(Fault("suspended", 2.0, 300.0, what="clock"))
+    assert report.seconds > 298.0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_signal_stops_the_robot_and_ends_the_mission(number):
+    class Told(GridRobot):
+        stopped = False
+
+        def complete(self):
+            os.kill(os.getpid(), number)
+            super().complete()
+
+        def stop(self):
+            self.stopped = True
+
+    robot = Told(floor(), MISSION.energy, WorkClock(REFERENCE))
+    before = signal.getsignal(number)
+    report = Monitor(PROGRAM, STEADY).run(MISSION, robot)
+    assert report.ending is Ending.ABORTED
+    assert robot.stopped
+    assert signal.getsignal(number) is before
+
+
+def test_a_second_ctrl_c_ends_the_program():
+    class Stubborn(GridRobot):
+        def complete(self):
+            os.kill(os.getpid(), signal.SIGINT)
+
+        def stop(self):
+            os.kill(os.getpid(), signal.SIGINT)
+
+    robot = Stubborn(floor(), MISSION.energy, WorkClock(REFERENCE))
+    with pytest.raises(KeyboardInterrupt):
+        Monitor(PROGRAM, STEADY).run(MISSION, robot)
+
+
+# The file of faults
+
+
+def faults_file(folder: Path, text: str) -> Path:
+    path = folder / "faults.toml"
+    path.write_text(text)
+    return path
+
+
+def test_faults_are_read_from_a_file(tmp_path):
+    text = 'seed = 4\n[[fault]]\nwhat = "see"\nkind = "raises"\nfrom = 1\nto = 2.5\nchance = 0.5\n'
+    schedule = read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM))
+    assert schedule.faults == (Fault("raises", 1.0, 2.5, "see", 0.5),)
+    assert schedule.seed == 4
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "fault = 3",
+        '[[fault]]\nwhat = "nobody"\nkind = "raises"',
+        '[[fault]]\nwhat = "see"\nkind = "sings"',
+        '[[fault]]\nwhat = "see"\nkind = "raises"\nfrom = 3\nto = 2',
+        '[[fault]]\nwhat = "see"\nkind = "raises"\nchance = 2.0',
+        '[[fault]]\nwhat = "see"\nkind = "raises"\nnan = nan',
+        "\x00",
+    ],
+)
+def test_a_file_that_tells_of_no_fault_is_refused_in_one_line(tmp_path, text):
+    with pytest.raises(AnytimeError) as refused:
+        read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_mission_file_cannot_bring_faults_of_its_own(tmp_path):
+    from experiments import shipped
+
+    text = shipped.mission_path().read_text() + '\n[[fault]]\nwhat = "see"\nkind = "raises"\n'
+    path = shipped.mission_path().parent / "office.pgm"
+    mission = tmp_path / "mission.toml"
+    mission.write_text(text)
+    with pytest.raises(AnytimeError, match="fault"):
+        read_mission(mission, map_path=path.parent.parent / "office.yaml")
+
+
+def test_a_mission_that_is_killed_leaves_a_log_that_reads():
+    from experiments.benchmarks import kills
+
+    assert not any(corrupt or lost for corrupt, lost in kills.killed(2, 0))
+
+
+def test_a_disk_that_fails_at_any_call_leaves_the_old_file_or_the_new():
+    from experiments.benchmarks import kills
+
+    assert not any(kills.failing())
+
+
+def test_hostile_files_are_refused_in_one_line_and_run_no_code():
+    script = (
+        "import json; from experiments.benchmarks import malformed as m;"
+        "c = m.read_all(300, 7); e = m.code_run(100, 8);"
+        "print(json.dumps([c.tracebacks, c.bad_exit, c.first, e]))"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert ended.stdout.strip() == '[0, 0, "", []]', ended.stderr
