@@ -144,7 +144,9 @@ def _deviation(worth: float, nets: Floats) -> float:
     return (float(nets.mean()) - worth) / max(error, 1e-9)
 
 
-def decision_times(table: DecisionTable, rng: np.random.Generator) -> Mapping[str, float]:
+def decision_times(
+    table: DecisionTable, rng: np.random.Generator, decisions: int = DECISIONS
+) -> Mapping[str, float]:
     """Microseconds of a decision by look-up, and how many times longer numpy's argmax of the
     paper's rule takes; both in states drawn evenly, interleaved, less an empty call."""
     process = table.process
@@ -152,7 +154,7 @@ def decision_times(table: DecisionTable, rng: np.random.Generator) -> Mapping[st
     moments = [
         Moment(int(f), int(x), int(y), int(t))
         for f, x, y, t in zip(
-            *(rng.integers(0, high, DECISIONS) for high in (frames, cells, levels, ticks)),
+            *(rng.integers(0, high, decisions) for high in (frames, cells, levels, ticks)),
             strict=True,
         )
     ]

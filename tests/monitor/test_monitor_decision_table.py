@@ -50,7 +50,7 @@ processes = st.builds(
     thinking=st.sampled_from([0.0, 0.1, 0.4]),
     value=st.sampled_from([None, np.linspace(10, 0, 28), 8 * 0.9 ** np.arange(20)]),
     factors=st.sampled_from([(1.0, 1.0, 1.0), (0.4, 1.0, 1.3)]),
-    frames=st.integers(1, 3),
+    frames=st.integers(1, 2),
 )
 
 
@@ -87,7 +87,7 @@ def by_definition(p: DecisionProcess) -> float:
     return worth(p.frames, 0, 0, 0)
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(processes)
 def test_table_is_the_optimum_by_definition(p):
     table = solve(p)
@@ -95,7 +95,7 @@ def test_table_is_the_optimum_by_definition(p):
     assert evaluate(p, table.actions) == pytest.approx(table.promised, abs=1e-9)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(processes)
 def test_no_policy_is_worth_more_than_the_table(p):
     best = solve(p).promised + 1e-9
