@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ def simulate(
     return kernels.simulate(*_arrays(process), actions, chance)
 
 
-def _arrays(process: DecisionProcess) -> tuple[object, ...]:
+def _arrays(process: DecisionProcess) -> tuple[Any, Any, Any, Any, Any, Any]:
     return (
         np.array(process.lengths),
         process.planning,

@@ -257,7 +257,9 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
         near = np.arange(max(0, index - width), min(count - 1, index + width + 1))
         later = np.minimum(near[:, None] + np.arange(1, count - index), count - 1)
         gains = runs.quality[:, later] - runs.quality[:, near, None]
-        offset = np.broadcast_to((near - index)[None, :, None], (len(runs), len(near), 1))
+        offset = np.broadcast_to(
+            (near - index).astype(np.float64)[None, :, None], (len(runs), len(near), 1)
+        )
         rows = np.concatenate([seen[:, near], offset], axis=2)
         base, slopes = _ridge(
             rows.reshape(-1, rows.shape[2]), gains.reshape(-1, gains.shape[2]), RIDGE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from monitor.stopping import (
+    Learner,
     Runs,
     Task,
     choose,
@@ -89,21 +90,23 @@ def read_traces(path: Path) -> TraceSet:
     return TraceSet(path.stem, runs, Task(lambda q, t: 100.0 * q - np.exp(rate * t)))
 
 
-def cross_validate(traces: TraceSet, seed: int) -> TraceLosses:
+def cross_validate(
+    traces: TraceSet, seed: int, learners: Mapping[str, Learner] = LEARNERS
+) -> TraceLosses:
     """Choose a rule by cross-validation within all folds but one, and judge it on that one."""
     runs, task = traces.runs, traces.task
     order = np.random.default_rng(seed).permutation(len(runs))
     folds = parts(len(runs), FOLDS, order)
     losses = {
         name: 100.0 * held_out(runs, task, learner, folds)
-        for name, learner in {"fixed": fixed_contract, **LEARNERS}.items()
+        for name, learner in {"fixed": fixed_contract, **learners}.items()
     }
     losses["chosen"] = np.zeros(len(runs))
     chosen: list[str] = []
     for index, fold in enumerate(folds):
         others = runs.of(np.setdiff1d(np.arange(len(runs)), fold))
         rng = np.random.default_rng([seed, index])
-        choice = choose(others, task, LEARNERS, folds=FOLDS, rng=rng)
+        choice = choose(others, task, learners, folds=FOLDS, rng=rng)
         chosen.append(choice.name)
         losses["chosen"][fold] = 100.0 * stop_runs(choice.rule, runs.of(fold), task).loss
     return TraceLosses(losses, tuple(chosen))
