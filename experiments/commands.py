@@ -13,7 +13,16 @@ from anytime.errors import AnytimeError
 if TYPE_CHECKING:
     from experiments.benchmarks.figures import Benchmark
 
-BENCHMARKS = ("planner", "compiler", "mission", "query", "nao", "deadline", "faults")
+BENCHMARKS = (
+    "planner",
+    "compiler",
+    "mission",
+    "query",
+    "nao",
+    "monitor",
+    "deadline",
+    "faults",
+)
 PARTS = ("nao",)
 
 
@@ -35,6 +44,12 @@ def declare(commands: Any) -> None:
     length.add_argument("--full", action="store_true", help="may take hours")
     parser.add_argument(
         "--maps", type=Path, metavar="DIR", help="MovingAI maps; default $ANYTIME_MAPS"
+    )
+    parser.add_argument(
+        "--traces",
+        type=Path,
+        metavar="DIR",
+        help="of monitor: recorded quality traces; default $ANYTIME_TRACES",
     )
     parser.add_argument("--seed", type=natural, default=0, help="of everything random")
     parser.add_argument(
@@ -80,6 +95,13 @@ def bench(options: argparse.Namespace) -> Answer:
 
     if options.maps is not None and not options.maps.is_dir():
         raise AnytimeError(f"--maps {options.maps}: no such folder")
+    given: dict[str, Path] = {}
+    if options.traces is not None:
+        if options.name != "monitor":
+            raise AnytimeError(f"--traces is for bench monitor, not for bench {options.name}")
+        if not options.traces.is_dir():
+            raise AnytimeError(f"--traces {options.traces}: no such folder")
+        given["traces"] = options.traces
     # BENCHMARKS is a closed list of ours, so this imports by no name that a user gave.
     benchmark = importlib.import_module(f"experiments.benchmarks.{options.name}")
     found = benchmark.measure(
@@ -88,6 +110,7 @@ def bench(options: argparse.Namespace) -> Answer:
         seed=options.seed,
         maps=options.maps,
         progress=lambda message: print(message, file=sys.stderr, flush=True),
+        **given,
     )
     width = max(len(key) for key in found.figures)
     lines = [f"{key:<{width}}  {_shown(value)}" for key, value in found.figures.items()]

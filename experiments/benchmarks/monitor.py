@@ -1,0 +1,183 @@
+"""The monitor: what policies lose against the optimum of sixteen decision processes, what a
+decision takes, and stopping rules on recorded traces."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_traces import trace_figures
+from monitor.certainty import resolve
+from monitor.decision_process import DecisionProcess, Moment
+from monitor.decision_table import (
+    DecisionTable,
+    evaluate,
+    simulate,
+    solve,
+    solve_cautiously,
+)
+from monitor.frame_rules import (
+    argmax_contract,
+    evaluate_frames,
+    paper_rule,
+    simulate_frames,
+    tuned_constant_rule,
+)
+from sensing import trace_folder
+
+Floats = NDArray[np.float64]
+MISSIONS = 5_000  # that check each computed worth
+TUNING = 300  # missions for the fixed rule
+GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
+DECISIONS = 100_000
+LATER = {
+    "world": "policies of the product on simulated worlds: not part of this benchmark yet",
+    "promise_error": "as world",
+    "share_of_cpu": "as world",
+    "fork.same_bytes": "missions cannot be forked yet",
+    "gate.found": "there is no value gate yet",
+    "gate.false_alarms": "there is no value gate yet",
+}
+NOT_YET = (
+    *(f"world.gap.{policy}" for policy in ("optimal", "paper", "fixed")),
+    *(f"world.margin_fixed.{kind}" for kind in ("linear", "soft", "hard")),
+    *(f"world.margin_fixed.{kind}_low" for kind in ("linear", "soft", "hard")),
+)
+
+
+def measure(
+    *,
+    quick: bool = False,
+    full: bool = False,
+    seed: int = 0,
+    maps: Path | None = None,
+    traces: Path | None = None,
+    progress: Callable[[str], None] = lambda message: None,
+) -> Benchmark:
+    """All figures; those of `traces.` if a folder is given or `$ANYTIME_TRACES` or the usual place
+    has one."""
+    missing: dict[str, str] = dict.fromkeys(NOT_YET, LATER["world"])
+    missing |= {key: reason for key, reason in LATER.items() if key != "world"}
+    settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
+    figures: dict[str, float | int | None] = {}
+    found: dict[str, list[float]] = {}
+    deviations: list[float] = []
+    solving: list[float] = []
+    for (noise, planner, value), process in kinds().items():
+        progress(f"{noise} noise, {planner} planner, {value} value")
+        lost = losses(process, seed, deviations, solving)
+        for policy, loss in lost.items():
+            found.setdefault(policy, []).append(loss)
+            figures[f"kind.{noise}_{planner}_{value}.{policy}"] = loss
+    for policy, values in found.items():
+        figures[f"loss.{policy}.mean"] = float(np.mean(values))
+        figures[f"loss.{policy}.worst"] = float(np.max(values))
+    figures["loss.paper.at_least_4_percent"] = int(np.sum(np.array(found["paper"]) >= 0.04))
+    figures["check.count"] = len(deviations)
+    figures["check.within_three_errors"] = float(np.mean(np.abs(deviations) <= 3.0))
+    figures["check.greatest_errors"] = float(np.max(np.abs(deviations)))
+    figures["solve_s"] = float(np.median(solving))
+    figures["solve_s_worst"] = float(np.max(solving))
+    progress("decisions")
+    process = kinds()["high", "slow", "exponential"]
+    table = solve(process)
+    figures |= decision_times(table, np.random.default_rng([seed, 1]))
+    folder = traces or trace_folder()
+    if folder is None:
+        for key in ("traces.loss", "traces.vs_fixed", "traces.worse_than_fixed"):
+            missing[key] = "no traces: --traces DIR or $ANYTIME_TRACES"
+    else:
+        measured, settings["rules_chosen"] = trace_figures(folder, seed, progress)
+        figures |= measured
+    return Benchmark("monitor", figures | dict.fromkeys(missing), settings, seed)
+
+
+def losses(
+    process: DecisionProcess, seed: int, deviations: list[float], solving: list[float]
+) -> dict[str, float]:
+    """Share of the optimum's worth that each policy loses in a process, computed.
+
+    Appends by how many standard errors 5,000 simulated missions differ from each computed worth,
+    and the seconds that the optimum took.
+    """
+    chance = np.random.default_rng([seed, 2]).random((TUNING, process.ticks, 2))
+    rules = {
+        "paper": paper_rule(process, GAIN),
+        "inter": paper_rule(process),
+        "fixed": tuned_constant_rule(process, chance),
+    }
+    solve(process)  # loads the machine code
+    began = time.perf_counter()
+    exact = solve(process)
+    solving.append(time.perf_counter() - began)
+    cautious = solve_cautiously(process)
+    tables = {
+        "exact": exact.actions,
+        "optimal": cautious.actions,
+        "resolve": resolve(process),
+        "smoothed": resolve(process, CAUTION),
+    }
+    worth = {name: evaluate(process, actions) for name, actions in tables.items()}
+    worth |= {name: evaluate_frames(process, rule) for name, rule in rules.items()}
+    rng = np.random.default_rng([seed, 3])
+    for name, actions in tables.items():
+        deviations.append(_deviation(worth[name], simulate(process, actions, MISSIONS, rng)))
+    for name, rule in rules.items():
+        chance = rng.random((MISSIONS, process.ticks, 2))
+        deviations.append(_deviation(worth[name], simulate_frames(process, rule, chance)))
+    lost = {name: 1.0 - value / exact.promised for name, value in worth.items()}
+    true = process.slower(SLOWER)
+    best = solve(true).promised
+    lost["wrong_profile"] = 1.0 - evaluate(true, cautious.actions) / best
+    lost["wrong_profile_exact"] = 1.0 - evaluate(true, exact.actions) / best
+    return lost
+
+
+def _deviation(worth: float, nets: Floats) -> float:
+    error = float(nets.std(ddof=1)) / np.sqrt(len(nets))
+    return (float(nets.mean()) - worth) / max(error, 1e-9)
+
+
+def decision_times(
+    table: DecisionTable, rng: np.random.Generator, decisions: int = DECISIONS
+) -> Mapping[str, float]:
+    """Microseconds of a decision by look-up, and how many times longer numpy's argmax of the
+    paper's rule takes; both in states drawn evenly, interleaved, less an empty call."""
+    process = table.process
+    ticks, frames, cells, levels = process.shape
+    moments = [
+        Moment(int(f), int(x), int(y), int(t))
+        for f, x, y, t in zip(
+            *(rng.integers(0, high, decisions) for high in (frames, cells, levels, ticks)),
+            strict=True,
+        )
+    ]
+    rival = argmax_contract(process)
+    clock, decide = time.perf_counter_ns, table.decide
+    ours, theirs, empty = [], [], []
+    for index, moment in enumerate(moments):
+        began = clock()
+        decide(moment)
+        ended = clock()
+        ours.append(ended - began)
+        began = clock()
+        ended = clock()
+        empty.append(ended - began)
+        if index % 50 == 0:
+            began = clock()
+            rival(moment)
+            theirs.append(clock() - began)
+    floor = float(np.median(empty))
+    times = np.array(ours) - floor
+    median = float(np.median(times))
+    return {
+        "decision.median_us": median / 1e3,
+        "decision.p99_us": float(np.quantile(times, 0.99)) / 1e3,
+        "decision.vs_numpy": (float(np.median(theirs)) - floor) / median,
+    }

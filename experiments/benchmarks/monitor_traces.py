@@ -1,0 +1,143 @@
+"""Stopping rules on recorded traces of anytime algorithms: nested cross-validation."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anytime.errors import AnytimeError
+from monitor.stopping import (
+    Learner,
+    Runs,
+    Task,
+    choose,
+    fixed_contract,
+    held_out,
+    parts,
+    standard_error,
+    stop_runs,
+)
+from monitor.stopping_rules import LEARNERS
+
+Floats = NDArray[np.float64]
+FOLDS = 10
+COARSEST = 80  # steps kept of a trace, about
+RATE_50_TSP = 0.075  # of the cost of time; the only set for which its authors state one
+
+
+@dataclass(frozen=True)
+class TraceSet:
+    """Recorded traces of one kind of problem, and what stopping them is worth."""
+
+    name: str
+    runs: Runs
+    task: Task
+
+
+@dataclass(frozen=True)
+class TraceLosses:
+    """Losses in percent of each run of a set, [N], by rule, and those of the rule that was chosen
+    without it; chosen: its name in each fold."""
+
+    losses: dict[str, Floats]
+    chosen: tuple[str, ...]
+
+    @property
+    def worse_than_fixed(self) -> bool:
+        """Whether the chosen rules lose more than the fixed contract by a standard error."""
+        more = self.losses["chosen"] - self.losses["fixed"]
+        return bool(more.mean() > standard_error(more))
+
+
+def read_traces(path: Path) -> TraceSet:
+    """A set of traces from its JSON file: by instance, `qualities` and `estimated_qualities`.
+
+    A shorter trace is held at its last value. Utility is 100 q − exp(b t); where b is not stated
+    it follows from how soon the traces are through, so that sets are alike.
+    """
+    try:
+        instances = json.loads(path.read_text(encoding="utf-8"))
+        pairs = [(row["qualities"], row["estimated_qualities"]) for row in instances.values()]
+        if len(pairs) < 2 * FOLDS or not all(len(true) == len(seen) > 1 for true, seen in pairs):
+            raise ValueError
+        length = max(len(true) for true, _ in pairs)
+        true, seen = (
+            np.array([[*row, *[row[-1]] * (length - len(row))] for row in rows], dtype=float)
+            for rows in zip(*pairs, strict=True)
+        )
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise AnytimeError(
+            f"{path}: no traces; it must map at least {2 * FOLDS} names to qualities and "
+            "estimated_qualities, equally long"
+        ) from error
+    if path.stem.startswith("50-tsp"):
+        rate, step = RATE_50_TSP, 1
+        horizon = min(length, int(1.3 * math.log(100) / rate))
+    else:
+        gained = true - true[:, :1]
+        through = (gained >= 0.99 * gained[:, -1:]).argmax(axis=1)
+        horizon = min(length, int(1.5 * float(np.median(through)) + 5))
+        step = max(1, horizon // COARSEST)
+        rate = math.log(100) / (0.75 * len(range(0, horizon, step)))
+    true, seen = true[:, :horizon:step], seen[:, :horizon:step]
+    runs = Runs(np.arange(true.shape[1], dtype=float), true, seen)
+    return TraceSet(path.stem, runs, Task(lambda q, t: 100.0 * q - np.exp(rate * t)))
+
+
+def cross_validate(
+    traces: TraceSet, seed: int, learners: Mapping[str, Learner] = LEARNERS
+) -> TraceLosses:
+    """Choose a rule by cross-validation within all folds but one, and judge it on that one."""
+    runs, task = traces.runs, traces.task
+    order = np.random.default_rng(seed).permutation(len(runs))
+    folds = parts(len(runs), FOLDS, order)
+    losses = {
+        name: 100.0 * held_out(runs, task, learner, folds)
+        for name, learner in {"fixed": fixed_contract, **learners}.items()
+    }
+    losses["chosen"] = np.zeros(len(runs))
+    chosen: list[str] = []
+    for index, fold in enumerate(folds):
+        others = runs.of(np.setdiff1d(np.arange(len(runs)), fold))
+        rng = np.random.default_rng([seed, index])
+        choice = choose(others, task, learners, folds=FOLDS, rng=rng)
+        chosen.append(choice.name)
+        losses["chosen"][fold] = 100.0 * stop_runs(choice.rule, runs.of(fold), task).loss
+    return TraceLosses(losses, tuple(chosen))
+
+
+def trace_figures(
+    folder: Path, seed: int, progress: Callable[[str], None]
+) -> tuple[dict[str, float | int | None], dict[str, object]]:
+    """Figures under `traces.`, and the settings: which rules were chosen in how many folds.
+
+    Raises AnytimeError for a folder without traces.
+    """
+    paths = sorted(folder.glob("*.json"))
+    if not paths:
+        raise AnytimeError(f"--traces {folder}: no .json file in it")
+    figures: dict[str, float | int | None] = {}
+    settings: dict[str, object] = {}
+    means: dict[str, list[float]] = {"chosen": [], "fixed": []}
+    worse = 0
+    for path in paths:
+        progress(f"traces: {path.stem}")
+        found = cross_validate(read_traces(path), seed)
+        for name, losses in found.losses.items():
+            figures[f"traces.{path.stem.replace('.', '_')}.{name}"] = float(losses.mean())
+        for name, column in means.items():
+            column.append(float(found.losses[name].mean()))
+        worse += found.worse_than_fixed
+        settings[path.stem] = {name: found.chosen.count(name) for name in set(found.chosen)}
+    tsp = [loss for path, loss in zip(paths, means["chosen"], strict=True) if "tsp" in path.stem]
+    figures["traces.loss"] = float(np.mean(means["chosen"]))
+    figures["traces.loss_tsp"] = float(np.mean(tsp)) if tsp else None
+    figures["traces.vs_fixed"] = float(np.sum(means["chosen"]) / np.sum(means["fixed"]))
+    figures["traces.worse_than_fixed"] = worse
+    return figures, settings

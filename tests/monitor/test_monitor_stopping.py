@@ -1,0 +1,154 @@
+"""Stopping rules: what they may return, what a look costs, and that none is chosen by chance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from anytime.errors import AnytimeError
+from monitor.stopping import (
+    STOP,
+    Runs,
+    Stop,
+    Task,
+    choose,
+    errors_apart,
+    fixed_contract,
+    held_out,
+    parts,
+    stop_runs,
+)
+from monitor.stopping_rules import LEARNERS, dynamic_programming, forecast, true_of_seen
+
+SECONDS = np.arange(1.0, 31.0)
+TASK = Task(lambda quality, seconds: 100.0 * quality - seconds)
+
+
+def recorded(count=40, seed=0, seconds=SECONDS):
+    """Runs of which half are soon through and half go on to gain."""
+    rng = np.random.default_rng(seed)
+    pace = np.where(np.arange(count) % 2, 3.0, 12.0)[:, None]
+    quality = 1 - np.exp(-seconds / pace) + 0.01 * rng.normal(size=(count, len(seconds)))
+    quality = np.maximum.accumulate(np.clip(quality, 0, 1), axis=1)
+    return Runs(seconds, quality, 0.9 * quality)
+
+
+def test_fixed_contract_stops_where_the_mean_is_best_and_never_looks():
+    runs = recorded()
+    stopped = stop_runs(fixed_contract(runs, TASK), runs, Task(TASK.utility, look=5.0))
+    mean = runs.utilities(TASK).mean(axis=0)
+    assert set(stopped.seconds) == {SECONDS[mean.argmax()]}
+    assert not stopped.looks.any()
+    assert stopped.utility.mean() == pytest.approx(mean.max())
+
+
+def test_rule_of_ones_own_is_a_function_of_the_history():
+    def patient(history):
+        if len(history.seconds) >= 2 and history.quality[-1] - history.quality[-2] < 0.02:
+            return STOP
+        return 2.0
+
+    runs = recorded()
+    stopped = stop_runs(patient, runs, TASK)
+    assert (stopped.looks == stopped.seconds / 2).all()
+    assert stopped.seconds[1::2].mean() < stopped.seconds[::2].mean()
+
+
+def test_each_look_is_paid_for():
+    runs = recorded()
+    free, dear = (
+        stop_runs(lambda history: 3.0, runs, Task(TASK.utility, look=cost)) for cost in (0.0, 0.5)
+    )
+    assert np.allclose(free.utility - dear.utility, 0.5 * free.looks)
+
+
+def test_rule_may_stop_later_without_looking():
+    runs = recorded()
+    rule = lambda history: 4.0 if not len(history.seconds) else Stop(2.5)  # noqa: E731
+    stopped = stop_runs(rule, runs, TASK)
+    assert set(stopped.seconds) == {7.0}
+    assert set(stopped.looks) == {1}
+
+
+@pytest.mark.parametrize("answer", [0.0, -1.0, float("nan"), Stop(-1.0), Stop(float("inf"))])
+def test_what_is_no_time_is_refused(answer):
+    with pytest.raises(AnytimeError, match="a rule"):
+        stop_runs(lambda history: answer, recorded(), TASK)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+@settings(max_examples=5, deadline=None)
+@given(seed=st.integers(0, 1000), begin=st.sampled_from([0.0, 1.0]))
+def test_every_rule_stops_every_run_and_loses_nothing_impossible(name, seed, begin):
+    runs = recorded(12, seed, SECONDS - 1 + begin)
+    stopped = stop_runs(LEARNERS[name](runs, TASK), runs, TASK)
+    assert (stopped.loss >= 0).all()
+    assert np.isin(stopped.seconds, runs.seconds).all()
+
+
+@pytest.mark.parametrize("name", ["forecast", "regression", "dynamic_programming"])
+def test_looking_pays_where_runs_differ(name):
+    runs = recorded(60)
+    folds = parts(60, 6, np.arange(60))
+    fixed = held_out(runs, TASK, fixed_contract, folds)
+    assert errors_apart(fixed, held_out(runs, TASK, LEARNERS[name], folds)) > 2
+
+
+def test_dynamic_programming_looks_less_the_dearer_a_look_is():
+    runs = recorded(60)
+    looks = []
+    for cost in (0.0, 0.5, 1000.0):
+        task = Task(TASK.utility, look=cost)
+        looks.append(stop_runs(dynamic_programming(runs, task), runs, task).looks.mean())
+    assert looks[0] >= looks[1] > 0
+    assert looks[2] == 0
+
+
+def test_looks_too_dear_make_of_dynamic_programming_the_fixed_contract():
+    runs, task = recorded(), Task(TASK.utility, look=1000.0)
+    ours = stop_runs(dynamic_programming(runs, task), runs, task).seconds
+    assert (ours == stop_runs(fixed_contract(runs, task), runs, task).seconds).all()
+
+
+def test_fixed_contract_is_kept_where_runs_are_alike():
+    quality = np.tile(1 - np.exp(-SECONDS / 6), (20, 1))
+    runs = Runs(SECONDS, quality, quality)
+    choice = choose(runs, TASK, {"forecast": forecast}, folds=5, rng=np.random.default_rng(0))
+    assert choice.name == "fixed"
+
+
+def test_better_rule_is_chosen_and_of_two_equal_ones_the_first():
+    learners = {"mine": forecast, "twin": forecast}
+    choice = choose(recorded(60), TASK, learners, folds=6, rng=np.random.default_rng(0))
+    assert choice.name == "mine"
+    assert set(choice.losses) == {"mine", "twin", "fixed"}
+
+
+def test_folds_share_the_runs_out():
+    folds = parts(23, 5, np.random.default_rng(0).permutation(23))
+    assert sorted(np.concatenate(folds)) == list(range(23))
+    assert {len(fold) for fold in folds} == {4, 5}
+    with pytest.raises(AnytimeError, match="folds"):
+        parts(3, 5, np.arange(3))
+
+
+def test_scale_of_what_is_seen_is_learnt():
+    intercept, slope = true_of_seen(recorded())
+    assert intercept == pytest.approx(0.0, abs=1e-9)
+    assert slope == pytest.approx(1 / 0.9)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "quality", "message"),
+    [
+        (np.arange(3.0), np.zeros((2, 4)), "seconds has shape"),
+        (np.zeros(4), np.zeros((2, 4)), "increase"),
+        (np.arange(4.0), np.full((2, 4), np.nan), "finite"),
+        (np.arange(4.0), np.zeros(4), "same shape"),
+    ],
+)
+def test_runs_that_do_not_fit_are_refused(seconds, quality, message):
+    with pytest.raises(AnytimeError, match=message):
+        Runs(seconds, quality, quality)
