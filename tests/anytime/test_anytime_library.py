@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, Machine, Profile, ProfileLibrary
-from anytime.files import _checksum, write_atomically
+from anytime.files import checksum, write_atomically
 from anytime.library import read_machine, read_profile, write_machine
 from anytime.machines import Rate
 from anytime.profiles import Recording
@@ -48,7 +48,7 @@ def written(tmp_path) -> Path:
 def rewritten(path: Path, content: dict) -> Path:
     """The content with a checksum that fits it, as a careful forger would write it."""
     content = {key: value for key, value in content.items() if key != "checksum"}
-    content["checksum"] = _checksum(content)
+    content["checksum"] = checksum(content)
     path.write_text(json.dumps(content))
     return path
 

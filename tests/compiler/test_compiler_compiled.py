@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import anytime
 import compiler
 from anytime import AnytimeError, Deadline, Machine, Status, WorkClock
-from anytime.files import _checksum
+from anytime.files import checksum
 
 MACHINE = Machine("m")
 for _name in ("see", "find", "quick", "walk"):
@@ -531,7 +531,7 @@ def loaded_or_refused(path):
 
 def rewritten(path, content):
     content = {key: value for key, value in content.items() if key != "checksum"}
-    content["checksum"] = _checksum(content)
+    content["checksum"] = checksum(content)
     path.write_text(json.dumps(content))
     return path
 

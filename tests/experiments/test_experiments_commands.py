@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from anytime.__main__ import main
-from anytime.files import _checksum, read_json
+from anytime.files import checksum, read_json
 from compiler import compile
 from experiments import shipped
 from monitor.robots.navigation import navigate
@@ -135,7 +135,7 @@ def empty_profile(tmp_path: Path) -> list[str]:
     content = read_json(see)
     content["runs"] = []
     del content["checksum"]
-    content["checksum"] = _checksum(content)
+    content["checksum"] = checksum(content)
     see.write_text(json.dumps(content))
     return arguments
 
