@@ -32,14 +32,15 @@ class Factor:
 
 @dataclass(frozen=True)
 class Semiring:
-    """How two factors are joined and how a variable is summed out."""
+    """How two factors are joined and how a variable is summed out; the total of nothing."""
 
     join: np.ufunc
     total: np.ufunc
+    nothing: float
 
 
-MIN_PLUS = Semiring(np.add, np.minimum)
-SUM_PRODUCT = Semiring(np.multiply, np.add)
+MIN_PLUS = Semiring(np.add, np.minimum, np.inf)
+SUM_PRODUCT = Semiring(np.multiply, np.add, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +142,13 @@ def _summed_out(tables: Sequence[Floats], shape: tuple[int, ...], semiring: Semi
     if prod(shape) <= WHOLE:
         return semiring.total.reduce(_joined(tables, semiring), axis=0)
     rows = [np.broadcast_to(table, (shape[0], *table.shape[1:])) for table in tables]
-    result = np.broadcast_to(_joined([row[0] for row in rows], semiring), shape[1:]).copy()
-    for level in range(1, shape[0]):
-        semiring.total(result, _joined([row[level] for row in rows], semiring), out=result)
+    result = np.full(shape[1:], semiring.nothing)
+    # A new array of this size for each level would cost more than its sum: its pages are cleared.
+    part = np.empty(shape[1:])
+    for level in range(shape[0]):
+        *small, last = [row[level] for row in rows]
+        semiring.join(_joined(small, semiring), last, out=part)
+        semiring.total(result, part, out=result)
     return result
 
 
