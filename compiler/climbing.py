@@ -41,7 +41,9 @@ def climbed(
             for factor in near:
                 index = tuple([slice(None) if n in group else levels[n] for n in factor.scope])
                 inside = [name for name in factor.scope if name in group]
-                part = factor.table[index].transpose([inside.index(n) for n in group if n in inside])
+                part = factor.table[index].transpose(
+                    [inside.index(n) for n in group if n in inside]
+                )
                 total = total + part[tuple([slice(None) if n in inside else None for n in group])]
             cheapest = np.unravel_index(int(np.argmin(total)), total.shape)
             if total[cheapest] < total[tuple([levels[name] for name in group])]:

@@ -19,7 +19,7 @@ from compiler.ordering import Order, elimination_order
 
 Floats = NDArray[np.float64]
 Levels = NDArray[np.intp]
-WHOLE = 1 << 16  # cells up to which a bucket is joined in one piece, which then stays in the cache
+PIECE = 1 << 15  # cells of a bucket that are joined at once, so that they stay in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,27 +32,26 @@ class Factor:
 
 @dataclass(frozen=True)
 class Semiring:
-    """How two factors are joined and how a variable is summed out; the total of nothing."""
+    """How two factors are joined and how a variable is summed out."""
 
     join: np.ufunc
     total: np.ufunc
-    nothing: float
 
 
-MIN_PLUS = Semiring(np.add, np.minimum, np.inf)
-SUM_PRODUCT = Semiring(np.multiply, np.add, 0.0)
+MIN_PLUS = Semiring(np.add, np.minimum)
+SUM_PRODUCT = Semiring(np.multiply, np.add)
 
 
 @dataclass(frozen=True, slots=True)
 class Steps:
-    """What was eliminated, in which order and from which factors, for walking back down.
+    """What was eliminated, in which order and from which tables, for walking back down.
 
-    factors: those given, then the one that each bucket of the order left behind. Joined tables
-    are not kept: a walk looks at one cell of each factor for every level of one variable.
+    tables: of the factors given, then the one that each bucket of the order left behind. Joined
+    tables are not kept: a walk looks at one row of each table for every variable.
     """
 
     order: Order
-    factors: tuple[Factor, ...]
+    tables: tuple[Floats, ...]
 
 
 def eliminate(
@@ -63,31 +62,26 @@ def eliminate(
     Returns the factor over `keep`, in that order, and the steps for `cheapest_levels`.
     """
     order = order_of(factors, keep)
-    every = list(factors)
+    tables = [factor.table for factor in factors]
     least_sums = _least_sums if semiring is MIN_PLUS else None
-    for bucket in order.buckets:
-        if least_sums is not None and bucket.axis >= 0:
-            costs, table = every[bucket.members[0]].table, every[bucket.members[1]].table
-            cut, axis = table.shape, bucket.axis
-            blocks = table.reshape(prod(cut[:axis]), cut[axis], -1)
-            left = least_sums(costs, blocks).reshape(bucket.shape[1:])
+    for variable, members, scope, shape, blocks in order.buckets:
+        if least_sums is not None and blocks is not None:
+            one, other = members
+            left = least_sums(tables[one], tables[other].reshape(blocks))
+            tables.append(left if len(scope) == 1 else left.reshape(shape[1:]))
         else:
-            names = (bucket.variable, *bucket.scope)
-            aligned = [_aligned(every[number], names) for number in bucket.members]
-            left = _summed_out(aligned, bucket.shape, semiring)
-        every.append(Factor(bucket.scope, left))
+            names = (variable, *scope)
+            aligned = [_aligned(tables[n], order.scopes[n], names) for n in members]
+            tables.append(_summed_out(aligned, shape, semiring))
     kept = tuple(keep)
-    rest = [_aligned(every[number], kept) for number in order.left]
-    return Factor(kept, _joined(rest, semiring)), Steps(order, tuple(every))
+    rest = [_aligned(tables[number], order.scopes[number], kept) for number in order.left]
+    return Factor(kept, _joined(rest, semiring)), Steps(order, tuple(tables))
 
 
 def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
     """The order in which `eliminate` sums out, and what that costs."""
-    sizes: dict[str, int] = {}
-    for factor in factors:
-        sizes.update(zip(factor.scope, factor.table.shape, strict=True))
     scopes = tuple([factor.scope for factor in factors])
-    return elimination_order(scopes, tuple(sizes.values()), tuple(keep))
+    return elimination_order(scopes, tuple([f.table.shape for f in factors]), tuple(keep))
 
 
 def cheapest_levels(steps: Steps, chosen: Mapping[str, int]) -> dict[str, int]:
@@ -101,14 +95,15 @@ def all_cheapest_levels(steps: Steps, chosen: Mapping[str, Levels]) -> dict[str,
     levels = dict(chosen)
     count = max((len(each) for each in levels.values()), default=1)
     for bucket in reversed(steps.order.buckets):
-        costs: Floats = np.zeros((bucket.shape[0], count))
+        costs: Floats | None = None
         for number in bucket.members:
-            factor = steps.factors[number]
-            axis = factor.scope.index(bucket.variable)
-            index = [levels[name] for name in factor.scope if name != bucket.variable]
-            table = np.moveaxis(factor.table, axis, 0)
-            costs = costs + (table[(slice(None), *index)] if index else table[:, None])
-        levels[bucket.variable] = costs.argmin(axis=0)
+            scope = steps.order.scopes[number]
+            index = tuple([levels[name] for name in scope if name != bucket.variable])
+            table = np.moveaxis(steps.tables[number], scope.index(bucket.variable), -1)[index]
+            costs = table if costs is None else costs + table
+        assert costs is not None  # a bucket has members
+        cheapest = costs.argmin(axis=-1)
+        levels[bucket.variable] = cheapest if costs.ndim == 2 else np.full(count, cheapest)
     return levels
 
 
@@ -127,28 +122,32 @@ def warm_up() -> None:
 _least_sums: Callable[[Floats, Floats], Floats] | None = None
 
 
-def _aligned(factor: Factor, names: tuple[str, ...]) -> Floats:
+def _aligned(table: Floats, scope: tuple[str, ...], names: tuple[str, ...]) -> Floats:
     """The table with an axis for each of the names, of length 1 where it is not in its scope."""
-    scope = factor.scope
     if scope == names:
-        return factor.table
+        return table
     order = [scope.index(name) for name in names if name in scope]
     index = tuple([slice(None) if name in scope else None for name in names])
-    return factor.table.transpose(order)[index]
+    return table.transpose(order)[index]
 
 
 def _summed_out(tables: Sequence[Floats], shape: tuple[int, ...], semiring: Semiring) -> Floats:
     """The first axis summed out of the join of aligned tables, which has that shape."""
-    if prod(shape) <= WHOLE:
+    cells = prod(shape)
+    if cells <= 2 * PIECE or len(shape) == 1:
         return semiring.total.reduce(_joined(tables, semiring), axis=0)
-    rows = [np.broadcast_to(table, (shape[0], *table.shape[1:])) for table in tables]
-    result = np.full(shape[1:], semiring.nothing)
-    # A new array of this size for each level would cost more than its sum: its pages are cleared.
-    part = np.empty(shape[1:])
-    for level in range(shape[0]):
-        *small, last = [row[level] for row in rows]
-        semiring.join(_joined(small, semiring), last, out=part)
-        semiring.total(result, part, out=result)
+    first, second, *rest = shape
+    tables = [np.broadcast_to(t, (t.shape[0], second, *t.shape[2:])) for t in tables]
+    result = np.empty(shape[1:])
+    if cells > PIECE * second:
+        for level in range(second):
+            each = [table[:, level] for table in tables]
+            result[level] = _summed_out(each, (first, *rest), semiring)
+        return result
+    width = PIECE * second // cells
+    for start in range(0, second, width):
+        joined = _joined([table[:, start : start + width] for table in tables], semiring)
+        semiring.total.reduce(joined, axis=0, out=result[start : start + width])
     return result
 
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+LAYOUTS = [
+    "float64[::1](float64[::1], float64[:,:,::1])",
+    "float64[::1](float64[:], float64[:,:,:])",
+]
 
-@njit("float64[::1](float64[::1], float64[:, :, ::1])", cache=True, nogil=True)
+
+@njit(LAYOUTS, cache=True, nogil=True)
 def least_sums(costs, table):
     """min over v of costs[v] + table[a, v, b], flat over (a, b): one pass, nothing stored."""
     first, levels, last = table.shape

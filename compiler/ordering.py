@@ -23,43 +23,46 @@ class Bucket(NamedTuple):
     members: numbers of those factors; bucket i of an order leaves factor `factors + i` behind.
     scope: the other variables that they speak of, which are those of the factor left behind.
     shape: levels of the variable, then of the scope.
-    axis: where there are two members, the first speaks of the variable alone and the second of
-    scope and variable in this order but for the variable's place, that place; -1 elsewhere. So it
-    is with every result that is used once.
+    blocks: levels before, of and after the variable in the second of two members, where the first
+    speaks of the variable alone; None elsewhere. So it is with every result that is used once.
     """
 
     variable: str
     members: tuple[int, ...]
     scope: Scope
     shape: tuple[int, ...]
-    axis: int
+    blocks: tuple[int, int, int] | None
 
 
 @dataclass(frozen=True)
 class Order:
     """Buckets in the order of elimination.
 
-    left: numbers of the factors that are left at the end. cells: of the largest joined table;
-    all_cells: of all of them, to which the time is in proportion. [Dec99]
+    scopes: of all factors, those that buckets leave behind included. left: numbers of the factors
+    that are left at the end. cells: of the largest joined table; all_cells: of all of them, to
+    which the time is in proportion. [Dec99]
     """
 
     buckets: tuple[Bucket, ...]
+    scopes: tuple[Scope, ...]
     left: tuple[int, ...]
     cells: float
     all_cells: float
 
 
 @lru_cache(maxsize=256)
-def elimination_order(scopes: tuple[Scope, ...], sizes: tuple[int, ...], keep: Scope) -> Order:
+def elimination_order(
+    scopes: tuple[Scope, ...], shapes: tuple[tuple[int, ...], ...], keep: Scope
+) -> Order:
     """A cheap order in which every variable but `keep` is eliminated.
 
-    scopes: variables of each factor. sizes: levels of the variables, in the order in which the
-    scopes first name them. What is used once is eliminated first, which makes no table larger;
-    then the variable with the least joined table. Where a table grows large, least fill-in and
-    random orders are tried as well.
+    scopes: variables of each factor; shapes: their levels. What is used once is eliminated first,
+    which makes no table larger; then the variable with the least joined table. Where a table grows
+    large, least fill-in and random orders are tried as well.
     """
-    names = dict.fromkeys([name for scope in scopes for name in scope])
-    levels = dict(zip(names, sizes, strict=True))
+    levels: dict[str, int] = {}
+    for scope, shape in zip(scopes, shapes, strict=True):
+        levels.update(zip(scope, shape, strict=True))
     draft = _peeled(scopes, levels, keep)
 
     def table(members: Sequence[Scope]) -> float:
@@ -106,10 +109,9 @@ def _peeled(scopes: Sequence[Scope], levels: Mapping[str, int], keep: Scope) -> 
         for name in scope:
             if uses[name] != 2 or name not in alone or name in keep:
                 continue
-            axis = scope.index(name)
-            scope = scope[:axis] + scope[axis + 1 :]
-            shape = (levels[name], *[levels[other] for other in scope])
-            buckets.append(Bucket(name, (alone[name], number), scope, shape, axis))
+            bucket = _bucket(name, (alone[name], number), (scope,), levels)
+            buckets.append(bucket)
+            scope = bucket.scope
             used += (alone[name], number)
             number = len(every)
             every.append(scope)
@@ -144,16 +146,11 @@ def _greedy(
             continue  # its neighbourhood has changed since, and it waits at another price
         del costs[variable]
         gone = sorted(members.pop(variable), key=lambda number: len(scopes[number]))
-        union = dict.fromkeys([name for number in gone for name in scopes[number]])
-        del union[variable]
-        scope = tuple(union)
-        shape = (levels[variable], *[levels[name] for name in scope])
-        once = len(gone) == 2 and len(scopes[gone[0]]) == 1
-        axis = scopes[gone[1]].index(variable) if once else -1
-        buckets.append(Bucket(variable, tuple(gone), scope, shape, axis))
+        bucket = _bucket(variable, tuple(gone), [scopes[number] for number in gone], levels)
+        buckets.append(bucket)
         used.update(gone)
-        scopes.append(scope)
-        for name in scope:
+        scopes.append(bucket.scope)
+        for name in bucket.scope:
             members[name] = [number for number in members[name] if number not in used]
             members[name].append(len(scopes) - 1)
             if name in costs:
@@ -161,4 +158,19 @@ def _greedy(
                 heapq.heappush(waiting, (costs[name], name))
     left = tuple([number for number in range(len(scopes)) if number not in used])
     cells = [prod(bucket.shape) for bucket in buckets]
-    return Order(tuple(buckets), left, max(cells, default=1), sum(cells))
+    return Order(tuple(buckets), tuple(scopes), left, max(cells, default=1), sum(cells))
+
+
+def _bucket(
+    variable: str, members: tuple[int, ...], scopes: Sequence[Scope], levels: Mapping[str, int]
+) -> Bucket:
+    """scopes: of the members, the least first; one that speaks of the variable alone may miss."""
+    union = dict.fromkeys([name for scope in scopes for name in scope])
+    del union[variable]
+    scope = tuple(union)
+    sizes = [levels[name] for name in scope]
+    blocks = None
+    if len(members) == 2 and len(scopes[0]) == 1 + len(scope) * (len(scopes) == 1):
+        axis = scopes[-1].index(variable)
+        blocks = prod(sizes[:axis]), levels[variable], prod(sizes[axis:])
+    return Bucket(variable, members, scope, (levels[variable], *sizes), blocks)

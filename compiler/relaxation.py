@@ -32,7 +32,8 @@ class Relaxation:
     """Shares of cost while they are improved; `bound` holds at any moment.
 
     The variables `fixed` have one level, the others all of theirs at first. `alive`: levels that
-    are left, by variable. `tables`: over those, with what they are charged.
+    are left, by variable. `tables`: over those, with what they are charged. `seen`: cells of tables
+    looked at since it was made.
     """
 
     def __init__(self, factors: Sequence[Factor], fixed: Mapping[str, int]) -> None:
@@ -46,18 +47,19 @@ class Relaxation:
             self.tables.append(factor.table[index].copy())
         # What is charged to none of the tables just now.
         self.costs = {name: np.zeros(len(levels)) for name, levels in self.alive.items()}
-        place = {name: number for number, name in enumerate(self.alive)}
+        self.seen = 0
         self._touching = {
             name: [(number, s.index(name)) for number, s in enumerate(self.scopes) if name in s]
-            for name in place
+            for name in self.alive
         }
-        self._after, self._before = (
-            {
-                name: [n for n, _ in touching if any(sign * place[o] > sign * at for o in self.scopes[n])]
-                for (name, touching), at in zip(self._touching.items(), place.values(), strict=True)
-            }
-            for sign in (1, -1)
-        )
+        # Factors that speak of a later variable, to which costs are passed on, and of an earlier.
+        place = {name: number for number, name in enumerate(self.alive)}
+        ends = [{place[name] for name in scope} for scope in self.scopes]
+        self._after: dict[str, list[int]] = {}
+        self._before: dict[str, list[int]] = {}
+        for name, touching in self._touching.items():
+            self._after[name] = [n for n, _ in touching if max(ends[n]) > place[name]]
+            self._before[name] = [n for n, _ in touching if min(ends[n]) < place[name]]
 
     @property
     def bound(self) -> float:
@@ -123,6 +125,7 @@ class Relaxation:
         other = copy.copy(self)
         other.tables = [table.copy() for table in self.tables]
         other.alive, other.costs = dict(self.alive), dict(self.costs)
+        other.seen = 0
         return other
 
     def _factors(self) -> list[Factor]:
@@ -144,6 +147,7 @@ class Relaxation:
         self.costs[variable] = np.zeros_like(costs) if onward else costs
         for (number, axis), taken in zip(touching, least, strict=True):
             table = self.tables[number]
+            self.seen += table.size
             change = (share if number in onward else 0.0) - taken[possible]
             table += change.reshape([-1 if a == axis else 1 for a in range(table.ndim)])
 

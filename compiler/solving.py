@@ -15,15 +15,15 @@ from compiler.elimination import (
     Factor,
     Floats,
     Levels,
+    Steps,
     all_cheapest_levels,
-    cheapest_levels,
     eliminate,
     order_of,
 )
 from compiler.relaxation import TIE, Relaxation
 
 CELLS = 2e7  # of the largest joined table up to which elimination is tried
-PARTS = 256  # into which the levels are divided for one level of the result, at most
+WORK = 1e9  # cells of tables looked at for one level of the output, at most (seconds)
 PASSES = 30  # of costs through the calls for one part, at most
 GAINING = 0.1  # share of the gap that a pass must close to be followed by another
 
@@ -33,15 +33,22 @@ class Solution:
     """The cheapest way found to every level of the output, and what it costs at least.
 
     seconds: [L] in all for each level of the output, inf where there is no way. bound: [L] no way
-    is cheaper than that; equal to seconds where that is proven. levels: [L] by variable, those on
-    the way; without meaning where seconds is inf. method: how it was found.
+    is cheaper than that; equal to seconds where that is proven. ways: the steps of elimination, or
+    [L] levels by variable. method: how it was found.
     """
 
     output: str
     seconds: Floats
     bound: Floats
-    levels: Mapping[str, Levels]
+    ways: Steps | Mapping[str, Levels]
     method: str
+
+    def levels(self, wanted: Levels) -> dict[str, Levels]:
+        """The levels of all variables on the ways to [K] levels of the output; without meaning
+        where there is no way."""
+        if isinstance(self.ways, Steps):
+            return all_cheapest_levels(self.ways, {self.output: wanted})
+        return {name: levels[wanted] for name, levels in self.ways.items()}
 
     @property
     def exact(self) -> bool:
@@ -66,9 +73,7 @@ def cheapest(factors: Sequence[Factor], output: str, cells: float = CELLS) -> So
     """
     if order_of(factors, (output,)).cells <= cells:
         costs, steps = eliminate(factors, (output,), MIN_PLUS)
-        every = np.arange(len(costs.table))
-        levels = all_cheapest_levels(steps, {output: every})
-        return Solution(output, costs.table, costs.table, levels, "elimination")
+        return Solution(output, costs.table, costs.table, steps, "elimination")
     count = next(
         size
         for factor in factors
@@ -100,13 +105,13 @@ def _cheapest_to(factors: Sequence[Factor], fixed: Mapping[str, int], cells: flo
     best = _Way({}, np.inf, np.inf)
     number = itertools.count()
     waiting = [(0.0, next(number), Relaxation(factors, fixed))]
-    bound, parts = 0.0, 0
-    while waiting and parts < PARTS:
+    seen = 0
+    while waiting and seen < WORK:
         bound, _, part = heapq.heappop(waiting)
         if bound >= best.seconds * (1 - TIE):
             return _Way(best.levels, best.seconds, best.seconds)
-        parts += 1
         best = _tightened(part, factors, fixed, best)
+        seen += part.seen
         if part.bound >= best.seconds * (1 - TIE):
             continue
         if part.joined_cells() <= cells:
@@ -128,13 +133,15 @@ def _tightened(
         part.improve()
         if not np.isfinite(part.bound):
             return best
-        found = climbed(factors, part.rounded(), frozenset(fixed))
+        found = part.rounded()
         best = _better(best, factors, found)
         gap = best.seconds - part.bound
         if gap <= TIE * best.seconds or part.bound - before < GAINING * gap:
             break
-    if np.isfinite(best.seconds):
-        part.prune(best.seconds)
+    if gap > TIE * best.seconds:
+        best = _better(best, factors, climbed(factors, found, frozenset(fixed)))
+        if np.isfinite(best.seconds):
+            part.prune(best.seconds)
     return best
 
 
