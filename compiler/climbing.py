@@ -24,14 +24,14 @@ def climbed(
         for name in levels
         if name not in fixed
     }
-    groups = [(name,) for name in touching]
-    groups += dict.fromkeys(
+    pairs = dict.fromkeys(
         (one, other)
         for factor in factors
         for place, one in enumerate(factor.scope)
         for other in factor.scope[place + 1 :]
         if one in touching and other in touching
     )
+    groups: list[tuple[str, ...]] = [*[(name,) for name in touching], *pairs]
     best, before = cost_of(factors, levels), np.inf
     while best < before:
         before = best

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +117,7 @@ def warm_up() -> None:
     global _least_sums
     from compiler import kernels
 
-    _least_sums = kernels.least_sums
+    _least_sums = cast(Callable[[Floats, Floats], Floats], kernels.least_sums)
 
 
 _least_sums: Callable[[Floats, Floats], Floats] | None = None

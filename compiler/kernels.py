@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
 
 LAYOUTS = [
     "float64[::1](float64[::1], float64[:,:,::1])",
@@ -12,7 +15,7 @@ LAYOUTS = [
 
 
 @njit(LAYOUTS, cache=True, nogil=True)
-def least_sums(costs, table):
+def least_sums(costs: Floats, table: Floats) -> Floats:
     """min over v of costs[v] + table[a, v, b], flat over (a, b): one pass, nothing stored."""
     first, levels, last = table.shape
     least = np.full(first * last, np.inf)

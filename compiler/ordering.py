@@ -66,7 +66,7 @@ def elimination_order(
     draft = _peeled(scopes, levels, keep)
 
     def table(members: Sequence[Scope]) -> float:
-        return prod([levels[name] for name in set().union(*members)])
+        return prod([levels[name] for name in frozenset[str]().union(*members)])
 
     best = _greedy(draft, levels, keep, table)
     if best.cells <= EASY:
@@ -74,7 +74,7 @@ def elimination_order(
 
     def fill(members: Sequence[Scope]) -> float:
         """Pairs of variables that would be joined for the first time."""
-        around = set().union(*members)
+        around = frozenset[str]().union(*members)
         there = {(a, b) for scope in members for a in scope for b in scope if a < b}
         return sum((a, b) not in there for a in around for b in around if a < b)
 

@@ -128,6 +128,7 @@ def _tightened(
     part: Relaxation, factors: Sequence[Factor], fixed: Mapping[str, int], best: _Way
 ) -> _Way:
     """Improve the bound of the part while that gains, and the best way by what is met."""
+    gap, found = np.inf, dict(best.levels)
     for _ in range(PASSES):
         before = part.bound
         part.improve()
