@@ -114,7 +114,7 @@ def qualities(responses: Sequence[Response], shares: Floats) -> Floats:
     made: dict[str, tuple[Floats, Floats]] = {}
     value: Floats = np.zeros(len(shares))
     for response, seconds in zip(responses, shares.T, strict=True):
-        moment: Levels = np.searchsorted(response.times, seconds)
+        moment: Levels = np.asarray(np.searchsorted(response.times, seconds), dtype=np.intp)
         value = np.zeros(len(shares))
         sides: list[tuple[tuple[Levels, Floats], tuple[Levels, Floats]]] = []
         for feed in response.feeds:

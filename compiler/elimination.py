@@ -44,8 +44,8 @@ SUM_PRODUCT = Semiring(np.multiply, np.add)
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
-    """What was eliminated, in which order and from which tables, for walking back down.
+class Step:
+    """One elimination: in which order and from which tables, for walking back down.
 
     tables: of the factors given, then the one that each bucket of the order left behind. Joined
     tables are not kept: a walk looks at one row of each table for every variable.
@@ -57,10 +57,11 @@ class Steps:
 
 def eliminate(
     factors: Sequence[Factor], keep: Sequence[str], semiring: Semiring
-) -> tuple[Factor, Steps]:
+) -> tuple[Factor, tuple[Step, ...]]:
     """Sum out every variable but `keep`, in a cheap order. [Dec99]
 
-    Returns the factor over `keep`, in that order, and the steps for `cheapest_levels`.
+    Returns the factor over `keep`, in that order, and a step for `cheapest_levels`; steps of
+    eliminations that follow each other are put together in that order.
     """
     order = order_of(factors, keep)
     tables = [factor.table for factor in factors]
@@ -76,7 +77,7 @@ def eliminate(
             tables.append(_summed_out(aligned, shape, semiring))
     kept = tuple(keep)
     rest = [_aligned(tables[number], order.scopes[number], kept) for number in order.left]
-    return Factor(kept, _joined(rest, semiring)), Steps(order, tuple(tables))
+    return Factor(kept, _joined(rest, semiring)), (Step(order, tuple(tables)),)
 
 
 def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
@@ -85,22 +86,22 @@ def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
     return elimination_order(scopes, tuple([f.table.shape for f in factors]), tuple(keep))
 
 
-def cheapest_levels(steps: Steps, chosen: Mapping[str, int]) -> dict[str, int]:
+def cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, int]) -> dict[str, int]:
     """The levels of all eliminated variables that reach the minimum, given those of the kept."""
     every = {name: np.array([level]) for name, level in chosen.items()}
     return {name: int(levels[0]) for name, levels in all_cheapest_levels(steps, every).items()}
 
 
-def all_cheapest_levels(steps: Steps, chosen: Mapping[str, Levels]) -> dict[str, Levels]:
+def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> dict[str, Levels]:
     """`cheapest_levels` for many choices at once: every value is [K] levels."""
     levels = dict(chosen)
     count = max((len(each) for each in levels.values()), default=1)
-    for bucket in reversed(steps.order.buckets):
+    for step, bucket in [(s, b) for s in reversed(steps) for b in reversed(s.order.buckets)]:
         costs: Floats | None = None
         for number in bucket.members:
-            scope = steps.order.scopes[number]
+            scope = step.order.scopes[number]
             index = tuple([levels[name] for name in scope if name != bucket.variable])
-            table = np.moveaxis(steps.tables[number], scope.index(bucket.variable), -1)[index]
+            table = np.moveaxis(step.tables[number], scope.index(bucket.variable), -1)[index]
             costs = table if costs is None else costs + table
         assert costs is not None  # a bucket has members
         cheapest = costs.argmin(axis=-1)

@@ -15,7 +15,7 @@ from compiler.elimination import (
     Factor,
     Floats,
     Levels,
-    Steps,
+    Step,
     all_cheapest_levels,
     eliminate,
     order_of,
@@ -33,20 +33,20 @@ class Solution:
     """The cheapest way found to every level of the output, and what it costs at least.
 
     seconds: [L] in all for each level of the output, inf where there is no way. bound: [L] no way
-    is cheaper than that; equal to seconds where that is proven. ways: the steps of elimination, or
+    is cheaper than that; equal to seconds where that is proven. ways: steps of elimination, or
     [L] levels by variable. method: how it was found.
     """
 
     output: str
     seconds: Floats
     bound: Floats
-    ways: Steps | Mapping[str, Levels]
+    ways: tuple[Step, ...] | Mapping[str, Levels]
     method: str
 
     def levels(self, wanted: Levels) -> dict[str, Levels]:
         """The levels of all variables on the ways to [K] levels of the output; without meaning
         where there is no way."""
-        if isinstance(self.ways, Steps):
+        if isinstance(self.ways, tuple):
             return all_cheapest_levels(self.ways, {self.output: wanted})
         return {name: levels[wanted] for name, levels in self.ways.items()}
 
