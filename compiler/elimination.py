@@ -8,16 +8,22 @@ distributions for fixed times it gives the expected utility exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import prod
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from compiler.ordering import Order, elimination_order
+
 Floats = NDArray[np.float64]
+Levels = NDArray[np.intp]
+PIECE = 1 << 15  # cells of a bucket that are joined at once, so that they stay in the cache
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Factor:
     """A table over the levels of some calls: one axis for each name in `scope`."""
 
@@ -29,73 +35,132 @@ class Factor:
 class Semiring:
     """How two factors are joined and how a variable is summed out."""
 
-    join: Callable[[Floats, Floats], Floats]
-    total: Callable[[Floats, int], Floats]
+    join: np.ufunc
+    total: np.ufunc
 
 
-MIN_PLUS = Semiring(np.add, lambda table, axis: table.min(axis=axis))
-SUM_PRODUCT = Semiring(np.multiply, lambda table, axis: table.sum(axis=axis))
+MIN_PLUS = Semiring(np.add, np.minimum)
+SUM_PRODUCT = Semiring(np.multiply, np.add)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Step:
-    """One eliminated variable: the joined table it was taken from, for walking back down."""
+    """One elimination: in which order and from which tables, for walking back down.
 
-    variable: str
-    scope: tuple[str, ...]
-    table: Floats
+    tables: of the factors given, then the one that each bucket of the order left behind. Joined
+    tables are not kept: a walk looks at one row of each table for every variable.
+    """
+
+    order: Order
+    tables: tuple[Floats, ...]
 
 
 def eliminate(
     factors: Sequence[Factor], keep: Sequence[str], semiring: Semiring
 ) -> tuple[Factor, tuple[Step, ...]]:
-    """Sum out every variable but `keep`, cheapest joined table first.
+    """Sum out every variable but `keep`, in a cheap order. [Dec99]
 
-    Returns the factor over `keep`, in that order, and the steps in the order they were made.
+    Returns the factor over `keep`, in that order, and a step for `cheapest_levels`; steps of
+    eliminations that follow each other are put together in that order.
     """
-    pending = list(factors)
-    sizes = {n: s for f in pending for n, s in zip(f.scope, f.table.shape, strict=True)}
-    remaining = sorted({name for factor in pending for name in factor.scope} - set(keep))
-    steps: list[Step] = []
-    while remaining:
-        variable = min(remaining, key=lambda name: (_width(pending, name, sizes), name))
-        remaining.remove(variable)
-        joined = _join([f for f in pending if variable in f.scope], semiring)
-        pending = [f for f in pending if variable not in f.scope]
-        steps.append(Step(variable, joined.scope, joined.table))
-        axis = joined.scope.index(variable)
-        left = joined.scope[:axis] + joined.scope[axis + 1 :]
-        pending.append(Factor(left, np.asarray(semiring.total(joined.table, axis))))
-    last = _join(pending, semiring)
-    order = [last.scope.index(name) for name in keep]
-    return Factor(tuple(keep), last.table.transpose(order)), tuple(steps)
+    order = order_of(factors, keep)
+    tables = [factor.table for factor in factors]
+    least_sums = _least_sums if semiring is MIN_PLUS else None
+    for variable, members, scope, shape, blocks in order.buckets:
+        if least_sums is not None and blocks is not None:
+            one, other = members
+            left = least_sums(tables[one], tables[other].reshape(blocks))
+            tables.append(left if len(scope) == 1 else left.reshape(shape[1:]))
+        else:
+            names = (variable, *scope)
+            aligned = [_aligned(tables[n], order.scopes[n], names) for n in members]
+            tables.append(_summed_out(aligned, shape, semiring))
+    kept = tuple(keep)
+    rest = [_aligned(tables[number], order.scopes[number], kept) for number in order.left]
+    return Factor(kept, _joined(rest, semiring)), (Step(order, tuple(tables)),)
 
 
-def cheapest_levels(steps: Sequence[Step], chosen: dict[str, int]) -> dict[str, int]:
+def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
+    """The order in which `eliminate` sums out, and what that costs."""
+    scopes = tuple([factor.scope for factor in factors])
+    return elimination_order(scopes, tuple([f.table.shape for f in factors]), tuple(keep))
+
+
+def cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, int]) -> dict[str, int]:
     """The levels of all eliminated variables that reach the minimum, given those of the kept."""
+    every = {name: np.array([level]) for name, level in chosen.items()}
+    return {name: int(levels[0]) for name, levels in all_cheapest_levels(steps, every).items()}
+
+
+def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> dict[str, Levels]:
+    """`cheapest_levels` for many choices at once: every value is [K] levels."""
     levels = dict(chosen)
-    for step in reversed(steps):
-        index = tuple(slice(None) if name == step.variable else levels[name] for name in step.scope)
-        levels[step.variable] = int(np.argmin(step.table[index]))
+    count = max((len(each) for each in levels.values()), default=1)
+    for step, bucket in [(s, b) for s in reversed(steps) for b in reversed(s.order.buckets)]:
+        costs: Floats | None = None
+        for number in bucket.members:
+            scope = step.order.scopes[number]
+            index = tuple([levels[name] for name in scope if name != bucket.variable])
+            table = np.moveaxis(step.tables[number], scope.index(bucket.variable), -1)[index]
+            costs = table if costs is None else costs + table
+        assert costs is not None  # a bucket has members
+        cheapest = costs.argmin(axis=-1)
+        levels[bucket.variable] = cheapest if costs.ndim == 2 else np.full(count, cheapest)
     return levels
 
 
-def _width(factors: Sequence[Factor], variable: str, sizes: dict[str, int]) -> float:
-    scope = {name for factor in factors if variable in factor.scope for name in factor.scope}
-    return float(np.prod([float(sizes[name]) for name in scope]))
+def warm_up() -> None:
+    """Eliminate in machine code from now on, with the same results.
+
+    It pays for who compiles often, not for one compilation: numba takes longer to load than a
+    program to be compiled.
+    """
+    global _least_sums
+    from compiler import kernels
+
+    _least_sums = cast(Callable[[Floats, Floats], Floats], kernels.least_sums)
 
 
-def _join(factors: Sequence[Factor], semiring: Semiring) -> Factor:
-    scope = tuple(dict.fromkeys(name for factor in factors for name in factor.scope))
-    joined: Floats | None = None
-    for factor in factors:
-        order = [factor.scope.index(name) for name in scope if name in factor.scope]
-        view = factor.table.transpose(order)
-        for place, name in enumerate(scope):
-            if name not in factor.scope:
-                view = np.expand_dims(view, place)
-        joined = view if joined is None else semiring.join(joined, view)
-    return Factor(scope, np.zeros(()) if joined is None else joined)
+_least_sums: Callable[[Floats, Floats], Floats] | None = None
+
+
+def _aligned(table: Floats, scope: tuple[str, ...], names: tuple[str, ...]) -> Floats:
+    """The table with an axis for each of the names, of length 1 where it is not in its scope."""
+    if scope == names:
+        return table
+    order = [scope.index(name) for name in names if name in scope]
+    index = tuple([slice(None) if name in scope else None for name in names])
+    return table.transpose(order)[index]
+
+
+def _summed_out(tables: Sequence[Floats], shape: tuple[int, ...], semiring: Semiring) -> Floats:
+    """The first axis summed out of the join of aligned tables, which has that shape."""
+    cells = prod(shape)
+    if cells <= 2 * PIECE or len(shape) == 1:
+        return semiring.total.reduce(_joined(tables, semiring), axis=0)
+    first, second, *rest = shape
+    tables = [np.broadcast_to(t, (t.shape[0], second, *t.shape[2:])) for t in tables]
+    result = np.empty(shape[1:])
+    if cells > PIECE * second:
+        for level in range(second):
+            each = [table[:, level] for table in tables]
+            result[level] = _summed_out(each, (first, *rest), semiring)
+        return result
+    width = PIECE * second // cells
+    for start in range(0, second, width):
+        joined = _joined([table[:, start : start + width] for table in tables], semiring)
+        semiring.total.reduce(joined, axis=0, out=result[start : start + width])
+    return result
+
+
+def _joined(tables: Sequence[Floats], semiring: Semiring) -> Floats:
+    """The join of aligned tables, small ones first, so that few cells are touched twice."""
+    if not tables:
+        return np.asarray(semiring.join.identity, dtype=float)
+    joined = tables[0]
+    for table in tables[1:]:
+        joined = semiring.join(joined, table)
+    return joined
 
 
 def times_to_levels(quality: NDArray[np.intp], times: Floats, levels: int) -> Floats:

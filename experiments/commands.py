@@ -146,11 +146,13 @@ def warm_up(options: argparse.Namespace) -> Answer:
     import numpy as np
 
     from anytime import WorkClock, measure
+    from compiler import elimination
     from experiments.domains import MACHINE, cross, domain
     from monitor.robots.grid import Scene
     from monitor.robots.grid_missions import REFERENCE
     from monitor.robots.navigation import frame_problems, navigate
 
+    elimination.warm_up()
     small = domain("r10", 32, 0)
     scene = Scene(small.free, small.start, small.goal, radius=16, frame=8.0)
     frames = list(frame_problems(scene, np.random.default_rng(0), 1))

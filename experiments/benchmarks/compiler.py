@@ -16,6 +16,7 @@ from compiler.division import divide
 from compiler.tables import Table
 from experiments.benchmarks import compiler_adaptive, compiler_constructs
 from experiments.benchmarks.compiler_constructs import KINDS
+from experiments.benchmarks.compiler_engine import engine_figures
 from experiments.benchmarks.figures import Benchmark
 from experiments.domains import MACHINE, Domain, cross, domain
 
@@ -67,7 +68,12 @@ def measure(
     figures |= {f"constructs.{kind}": count for kind, count in wrong.items()}
     progress("adaptive schedules on chains with bad luck")
     figures |= compiler_adaptive.measure(3 if quick else 12, seed)
-    settings = {
+    figures["dag5.mismatches"] = sum(
+        _mismatch(random_program(rng, True, calls=5)) for _ in range(dags)
+    )
+    engine, how = engine_figures(quick, seed, progress)
+    figures |= engine
+    settings = how | {
         "family": FAMILY,
         "size": SIZE,
         "problems": problems,
@@ -136,10 +142,12 @@ def _achieved(
     return qualities
 
 
-def random_program(rng: np.random.Generator, shared: bool) -> tuple[Table, ...]:
-    """Deterministic tables of a random program of 2 to 4 calls; half of them are not monotone in
-    their inputs. With `shared` a result may feed several calls."""
-    count = int(rng.integers(2, 5))
+def random_program(
+    rng: np.random.Generator, shared: bool, calls: int | None = None
+) -> tuple[Table, ...]:
+    """Deterministic tables of a random program of 2 to 4 calls, or of so many; half of them are not
+    monotone in their inputs. With `shared` a result may feed several calls."""
+    count = int(rng.integers(2, 5)) if calls is None else calls
     monotone = bool(rng.random() < 0.5)
     feeds: list[list[int]] = [[] for _ in range(count)]
     for place in range(count - 1):

@@ -1,0 +1,30 @@
+"""Machine code for the inner loop of elimination; imported by `elimination.warm_up` alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+LAYOUTS = [
+    "float64[::1](float64[::1], float64[:,:,::1])",
+    "float64[::1](float64[:], float64[:,:,:])",
+]
+
+
+@njit(LAYOUTS, cache=True, nogil=True)
+def least_sums(costs: Floats, table: Floats) -> Floats:
+    """min over v of costs[v] + table[a, v, b], flat over (a, b): one pass, nothing stored."""
+    first, levels, last = table.shape
+    least = np.full(first * last, np.inf)
+    for a in range(first):
+        into = least[a * last : (a + 1) * last]
+        for v in range(levels):
+            cost = costs[v]
+            row = table[a, v]
+            for b in range(last):
+                total = cost + row[b]
+                into[b] = total if total < into[b] else into[b]
+    return least
