@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from anytime.joins import Several
 from compiler import costs, grouped
-from compiler.elimination import SUM_PRODUCT, Factor, cheapest_levels, eliminate, times_to_levels
+from compiler.elimination import (
+    SUM_PRODUCT,
+    Factor,
+    all_cheapest_levels,
+    eliminate,
+    times_to_levels,
+)
 from compiler.objectives import EXPECTED, Objective
 from compiler.tables import Table
 
@@ -66,9 +72,10 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     if len(calls) <= 2 or cells <= ALL:
         fixed = [0] * len(tables)
         return _frontier(tables, *_weighed(tables, fixed, calls, objective), objective)
-    totals, moments, values = _from_mean_levels(tables, objective)
-    if all(_certain(table) for table in tables) and objective is EXPECTED:
-        return _frontier(tables, totals, moments, values, objective)
+    (totals, moments, values), proven = _from_mean_levels(tables, objective)
+    if all(_certain(table) for table in tables) and objective == EXPECTED:
+        found = _frontier(tables, totals, moments, values, objective)
+        return replace(found, exact=proven)
     plain = _plain(tables, objective)
     totals = np.concatenate([totals, plain[0]])
     moments = np.concatenate([moments, plain[1]])
@@ -260,8 +267,9 @@ def _plain(tables: Sequence[Table], objective: Objective) -> Divisions:
     return _totals(tables, moments), moments, values
 
 
-def _from_mean_levels(tables: Sequence[Table], objective: Objective) -> Divisions:
-    """Divisions that are optimal if every quality came out at its mean: (min, +) elimination."""
+def _from_mean_levels(tables: Sequence[Table], objective: Objective) -> tuple[Divisions, bool]:
+    """Divisions that are optimal if every quality came out at its mean, by (min, +) elimination,
+    and whether that is proven."""
     factors: list[Factor] = []
     nearest: list[NDArray[np.intp]] = []
     for table in tables:
@@ -273,18 +281,18 @@ def _from_mean_levels(tables: Sequence[Table], objective: Objective) -> Division
         least = times_to_levels(level, table.times, len(table.levels))
         factors.append(Factor((*table.feeds, table.label), least))
     output = tables[-1].label
-    found_costs, steps = grouped.eliminate_groups(tables, factors, output)
-    found: list[tuple[int, ...]] = [tuple(0 for _ in tables)]
-    for level in np.flatnonzero(np.isfinite(found_costs.table)):
-        levels = cheapest_levels(steps, {output: int(level)})
-        row: list[int] = []
-        for table, reached in zip(tables, nearest, strict=True):
-            fed = tuple(levels[name] for name in table.feeds)
-            row.append(int(np.flatnonzero(reached[fed] == levels[table.label])[0]))
-        found.append(tuple(row))
-    moments = np.array(found, dtype=np.intp)
-    values = np.array([value_of(tables, row, objective) for row in found])
-    return _totals(tables, moments), moments, values
+    solution, steps = grouped.cheapest_in_groups(tables, factors, output)
+    levels = solution.levels(np.flatnonzero(np.isfinite(solution.seconds)))
+    levels = all_cheapest_levels(steps, levels)
+    rows = [
+        (
+            reached[tuple(levels[name] for name in table.feeds)] == levels[table.label][:, None]
+        ).argmax(axis=-1)
+        for table, reached in zip(tables, nearest, strict=True)
+    ]
+    moments = np.vstack([np.zeros(len(tables), dtype=np.intp), np.transpose(rows)])
+    values = np.array([value_of(tables, row.tolist(), objective) for row in moments])
+    return (_totals(tables, moments), moments, values), solution.exact
 
 
 def _certain(table: Table) -> bool:

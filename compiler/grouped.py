@@ -8,13 +8,14 @@ import numpy as np
 
 from compiler.costs import joined
 from compiler.elimination import MIN_PLUS, Factor, Step, eliminate
+from compiler.solving import Solution, cheapest
 from compiler.tables import Table
 
 
-def eliminate_groups(
+def cheapest_in_groups(
     tables: Sequence[Table], factors: Sequence[Factor], output: str
-) -> tuple[Factor, tuple[Step, ...]]:
-    """Least seconds for each level of the output, and the steps to walk back down.
+) -> tuple[Solution, tuple[Step, ...]]:
+    """Least seconds for each level of the output, and the steps that led to the arms' tables.
 
     factors: least seconds of each table's levels. What only one arm of a group needs is summed
     out within that arm; the arms' tables then join as their times do, by the longer of a branch
@@ -22,8 +23,7 @@ def eliminate_groups(
     """
     by_label = dict(zip((table.label for table in tables), factors, strict=True))
     pending, steps = _reduced(tables, by_label, 0)
-    cost, last = eliminate(pending, (output,), MIN_PLUS)
-    return cost, (*steps, *last)
+    return cheapest(pending, output), steps
 
 
 def _reduced(

@@ -10,6 +10,7 @@ import pytest
 import anytime
 import compiler
 from anytime import AnytimeError, Machine, Status, WallClock, WorkClock
+from compiler import division
 from experiments.benchmarks.compiler_constructs import KINDS, mismatches
 
 MACHINE = Machine("m")
@@ -130,6 +131,14 @@ def schedules():
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_division_of_a_program_with_constructs_beats_the_compiled_one(kind):
     assert mismatches(kind, 25, seed=1) == 0
+
+
+@pytest.mark.parametrize("kind", ["choose", "parallel"])
+def test_programs_too_large_to_weigh_all_divisions_are_exact_where_nothing_is_left_to_chance(
+    kind, monkeypatch
+):
+    monkeypatch.setattr(division, "ALL", 0)
+    assert mismatches(kind, 25, seed=2) == 0
 
 
 # What runs
