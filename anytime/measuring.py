@@ -23,7 +23,8 @@ from anytime.results import Change, Result
 from anytime.running import Run, execute, seed_of
 from anytime.structure import answers
 
-STRATA = 4  # runs of a consumer on one problem, at most
+STRATA = 4  # qualities of an input that a consumer is run on, on one problem
+COMBINATIONS = 9  # of several inputs that it is run on, at most
 CHANGES = 64  # registrations kept of one run, at most
 CONTRACTS = 8  # times for which a contract module is run, each half of the next
 
@@ -62,9 +63,9 @@ def measure(
     problems).
 
     In a program, what each module really delivers feeds the next: at most `STRATA` runs a call
-    and problem, on results equally spaced in achieved quality plus the last; several inputs by
-    Latin square. Quality is scored after the clock has stopped, and a cost is normalised by the
-    cheapest known for its problem when all of its runs are done.
+    and problem, on results equally spaced in achieved quality plus the last; of several inputs,
+    `COMBINATIONS` of such results. Quality is scored after the clock has stopped, and a cost is
+    normalised by the cheapest known for its problem when all of its runs are done.
     Raises AnytimeError for a problem without a needed attribute and for a module without a score.
     """
     if not isinstance(what, Module | Program):  # pyright: ignore[reportUnnecessaryIsInstance]
@@ -78,7 +79,7 @@ def measure(
     if not seconds > 0:
         raise AnytimeError(f"seconds={seconds}; give the time that each run may take, > 0")
     samples: dict[str, dict[str, list[_Sample]]] = {call.label: {} for call in program.calls}
-    keys = _keys(program, listed)
+    keys = problem_keys(program, listed)
     for done, (key, problem) in enumerate(zip(keys, listed, strict=True)):
         for call in program.calls:
             told = _told(program, call, problem, key, samples)
@@ -120,7 +121,8 @@ def _sample(
             if len(kept) >= 4 * CHANGES:  # bounds the memory of a module that registers for ever
                 del kept[1:-1:2]
 
-        time.sleep(rest)
+        if rest:  # even a sleep of 0 s gives the processor away
+            time.sleep(rest)
         rng = np.random.default_rng(seed_of(seed, call.label, key, levels))
         deadline = Deadline.after(budget, clock())
         result, run = execute(module, inputs, deadline, rng=rng, observe=observe)
@@ -208,7 +210,11 @@ def _argument(argument: Any, problem: Any) -> Any:
 def _feeds(
     call: Call, key: str, samples: Mapping[str, Mapping[str, list[_Sample]]]
 ) -> list[tuple[tuple[str, _Sample, int], ...]]:
-    """Which results of the calls upstream this call is run on: a Latin square of their strata."""
+    """Which results of the calls upstream this call is run on.
+
+    Of several inputs: all as good as each other, from the worst together to the best together,
+    because that is what a good division of time delivers; and a Latin square of the others.
+    """
     feeding = upstream(call)
     if not feeding:
         return [()]
@@ -223,28 +229,43 @@ def _feeds(
         columns.append(_strata(pool))
     if any(not column for column in columns):
         return []  # nothing arrived, so nothing is run: no result is never extrapolated to
-    count = max(len(column) for column in columns)
-    shifts = np.random.default_rng(seed_of("latin", call.label, key)).permutation(count)
     return [
-        tuple(
-            column[(row + shifts[place % count] * (place > 0)) % len(column)]
-            for place, column in enumerate(columns)
-        )
-        for row in range(count)
+        tuple(column[place] for column, place in zip(columns, row, strict=True))
+        for row in _design([len(column) for column in columns], seed_of("latin", call.label, key))
     ]
 
 
+def _design(sizes: Sequence[int], seed: int) -> list[tuple[int, ...]]:
+    """Which of the strata of each input are fed together: all combinations if they are few."""
+    if math.prod(sizes) <= COMBINATIONS:
+        return list(itertools.product(*(range(size) for size in sizes)))
+    count = max(sizes)
+    spread = [np.linspace(0, size - 1, count).round().astype(int).tolist() for size in sizes]
+    shifts = np.random.default_rng(seed).permutation(count).tolist()
+    latin = [shifts[place % count] - shifts[0] for place in range(len(sizes))]
+    rows = [
+        tuple(places[(row + by) % count] for places, by in zip(spread, shifted, strict=True))
+        for shifted in ([0] * len(sizes), latin)
+        for row in range(count)
+    ]
+    return list(dict.fromkeys(rows))
+
+
 def _strata(pool: Sequence[tuple[str, _Sample, int]]) -> list[tuple[str, _Sample, int]]:
-    """At most `STRATA` results, equally spaced in achieved quality, and the last one."""
-    if len(pool) <= STRATA:
-        return list(pool)
+    """At most `STRATA` results, equally spaced in achieved quality, and the last one; the worst
+    first."""
+    if not pool:
+        return []
     # A cost rises where a quality falls. Where a join mixes both, they are spaced apart.
     quality = np.array(
         [s.raw[i] if s.module.quality is not None else -s.raw[i] for _, s, i in pool]
     )
-    targets = np.linspace(quality.min(), quality.max(), STRATA - 1)
-    nearest = [int(np.argmin(np.abs(quality - target))) for target in targets]
-    return [pool[index] for index in sorted({*nearest, len(pool) - 1})]
+    chosen = set(range(len(pool)))
+    if len(pool) > STRATA:
+        targets = np.linspace(quality.min(), quality.max(), STRATA - 1)
+        chosen = {int(np.argmin(np.abs(quality - target))) for target in targets}
+        chosen.add(len(pool) - 1)
+    return [pool[index] for index in sorted(chosen, key=lambda index: (quality[index], index))]
 
 
 def _library(
@@ -331,7 +352,7 @@ def _rate(runs: Sequence[_Sample]) -> Rate:
     )
 
 
-def _keys(program: Program, problems: Sequence[Any]) -> list[str]:
+def problem_keys(program: Program, problems: Sequence[Any]) -> list[str]:
     """A key for each problem: its name, or a hash of its inputs; equal problems are numbered."""
     keys: list[str] = []
     for problem in problems:

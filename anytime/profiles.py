@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
 from anytime.pictures import duration, figure, line_chart, number, sparkline
+from anytime.strata import stratum_weights
 
 Floats = NDArray[np.float64]
 
@@ -129,38 +130,66 @@ class Profile:
     @cached_property
     def weights(self) -> Floats:
         """Weight of each run under the condition; every problem has the same weight. Sum 1."""
-        weights = np.zeros(len(self.recordings))
-        for problem in self.problems:
-            members = [i for i, run in enumerate(self.recordings) if run.problem == problem]
-            weights[members] = self._strata(members) * self._alike(members)
-        total = weights.sum()
-        return weights / total if total > 0 else np.full(len(weights), 1 / len(weights))
+        return self.weights_given((), np.zeros((1, 0)))[0]
 
-    def _strata(self, members: list[int]) -> Floats:
-        """Weights of one problem's runs: interpolated over the qualities of their inputs."""
-        asked = [name for name in self.inputs if name in self.condition]
-        if not asked:
-            return np.full(len(members), 1 / len(members))
-        points = np.array([[self.recordings[i].inputs[name] for name in asked] for i in members])
-        target = np.array([self.condition[name] for name in asked])
-        if len(asked) == 1:
-            return _between(points[:, 0], float(target[0]))
-        # Several inputs: Shepard's inverse distance, exact at the runs themselves.
-        distance = np.abs(points - target).sum(axis=1)
-        closeness = 1.0 / np.maximum(distance, 1e-6) ** 2
-        return closeness / closeness.sum()
+    def weights_given(self, asked: Sequence[str], qualities: Floats) -> Floats:
+        """Weights of the runs, [n, runs], for n combinations of input qualities, [n, asked], on top
+        of the condition; each row sums to 1."""
+        key = (*asked, qualities.tobytes())
+        if key not in self._weights_given:
+            self._weights_given[key] = self._weights_of(asked, qualities)
+        return self._weights_given[key]
 
-    def _alike(self, members: list[int]) -> float:
-        """How much this problem counts for the features asked for (a Gaussian kernel)."""
-        weight = 1.0
-        for name in self.features:
-            if name not in self.condition:
+    @cached_property
+    def _weights_given(self) -> dict[tuple[str | bytes, ...], Floats]:
+        return {}
+
+    def _weights_of(self, asked: Sequence[str], qualities: Floats) -> Floats:
+        known = {name: self.condition[name] for name in self.inputs if name in self.condition}
+        fixed = {name: value for name, value in known.items() if name not in asked}
+        names = [*asked, *fixed]
+        targets = np.hstack([qualities, np.tile([*fixed.values()], (len(qualities), 1))])
+        rows, there = self.by_problem
+        points = np.array([[run.inputs[name] for name in names] for run in self.recordings])
+        points = points.reshape(len(self.recordings), len(names))[rows]
+        alike = self._alike(rows[:, 0])[:, None]
+        weights = np.zeros((len(targets), len(self.recordings)))
+        for first in range(0, len(targets), 64):  # some at a time, because all need much memory
+            some = targets[first : first + 64]
+            problems = np.tile(np.arange(len(rows)), len(some))
+            target = np.repeat(some, len(rows), axis=0)
+            each = stratum_weights(points[problems], target, there[problems])
+            each = each.reshape(len(some), *there.shape) * alike
+            weights[first : first + 64, rows[there]] = each[:, there]
+        total = weights.sum(axis=1, keepdims=True)
+        return np.where(
+            total > 0, weights / np.where(total > 0, total, 1.0), 1 / len(self.recordings)
+        )
+
+    @cached_property
+    def by_problem(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+        """Places of the runs of each problem, in the order of `problems`: [P, R] indices, padded
+        with 0, and whether there is such a run."""
+        members: dict[str, list[int]] = {problem: [] for problem in self.problems}
+        for place, run in enumerate(self.recordings):
+            members[run.problem].append(place)
+        most = max(len(places) for places in members.values())
+        padded = [[*places, *[-1] * (most - len(places))] for places in members.values()]
+        rows = np.array(padded, dtype=np.intp)
+        return np.maximum(rows, 0), rows >= 0
+
+    def _alike(self, firsts: NDArray[np.intp]) -> Floats:
+        """How much each problem, known by its first run, counts for the features asked for (a
+        Gaussian kernel), [P]."""
+        weights = np.ones(len(firsts))
+        for name in self.condition:
+            if name in self.inputs:
                 continue
             values = np.array([run.features.get(name, np.nan) for run in self.recordings])
             width = max(float(np.nanstd(values)) * len(self.problems) ** -0.2, 1e-9)
-            own = self.recordings[members[0]].features.get(name, np.inf)
-            weight *= float(np.exp(-0.5 * ((own - self.condition[name]) / width) ** 2)) + 1e-9
-        return weight
+            apart = np.nan_to_num(values[firsts], nan=np.inf) - self.condition[name]
+            weights *= np.exp(-0.5 * (apart / width) ** 2) + 1e-9
+        return weights
 
     def quality_at(self, seconds: ArrayLike) -> Floats:
         """Quality of each run at each time, [runs, times]; NaN before its first result."""
@@ -346,17 +375,3 @@ class Profile:
             series, bands=bands, x_label="time [s]", y_label="expected quality", title=self.module
         )
         return figure(svg, repr(self))
-
-
-def _between(points: Floats, target: float) -> Floats:
-    """Linear interpolation weights of `target` among points [n], equal points sharing theirs."""
-    low = points[points <= target + 1e-12]
-    high = points[points >= target - 1e-12]
-    below = low.max() if len(low) else points.min()
-    above = high.min() if len(high) else points.max()
-    share = 0.0 if above - below < 1e-12 else (target - below) / (above - below)
-    weights = np.zeros(len(points))
-    for level, part in ((below, 1 - share), (above, share)):
-        chosen = np.abs(points - level) < 1e-12
-        weights[chosen] += part / chosen.sum()
-    return weights

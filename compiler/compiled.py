@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from anytime import running
-from anytime.clocks import Clock, Deadline
+from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
 from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
@@ -20,16 +20,19 @@ from anytime.programs import Program, makers
 from anytime.results import Result, Status
 from compiler import baselines
 from compiler.adaptive import ceiling
+from compiler.advising import Advice, advise
+from compiler.calibrating import Calibration
 from compiler.costs import stretched
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.executing import Execution, Listener, planned, status_of, unwanted
-from compiler.explaining import Advice, Explanation, advise, explain
+from compiler.explaining import Explanation, certificate, explain
 from compiler.guarding import Steps
-from compiler.intervals import Interval
 from compiler.objectives import EXPECTED, Objective
 from compiler.policies import Plan, Policy
+from compiler.replaying import Replay
 from compiler.storing import save
 from compiler.tables import Table
+from compiler.validating import Validation, validate
 
 QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
 
@@ -55,17 +58,21 @@ class CompiledProgram:
     """A program with the best division of any amount of time among its calls.
 
     tables: one for each call; frontier: the divisions worth having; steps: durations of each
-    module's steps, for the deadline guard.
+    module's steps, for the deadline guard. calibration: from what the tables say to what is
+    promised. regret: no division promises more by more than that, at 95 %. replay: the recorded
+    problems, not in files.
     """
 
     program: Program
     tables: tuple[Table, ...]
     frontier: Frontier
-    intervals: tuple[Interval, ...]
+    calibration: Calibration
     steps: Mapping[str, Steps]
     machine: str
+    regret: float
     objective: Objective = EXPECTED
     policy: Policy | None = None
+    replay: Replay | None = field(default=None, compare=False)
 
     @property
     def name(self) -> str:
@@ -93,13 +100,19 @@ class CompiledProgram:
         if self.frontier.exact:
             return self.promise(seconds)
         bound = ceiling(self.program, self.tables, _finite(seconds), self.objective)
-        return max(self.promise(seconds), 1.0 if bound is None else bound)
+        return max(self.promise(seconds), 1.0 if bound is None else self.calibration.promise(bound))
 
     def _plan(self, seconds: float) -> Plan | None:
         """The plan of the policy for a budget, where it is worth more than the best division."""
         plan = self.policy.plan(seconds) if self.policy else None
         better = plan is not None and plan.value > self.frontier.promise(seconds) + 1e-9
         return plan if better else None
+
+    def interval(self, seconds: float) -> tuple[float, float]:
+        """The 95 % interval of the promise for a budget; (0, 0) below the least one."""
+        if self.frontier.index(_finite(seconds)) < 0:
+            return 0.0, 0.0
+        return self.calibration.interval(self.promise(seconds))
 
     def allocate(self, seconds: float) -> Allocation:
         """The best division of a budget. Raises AnytimeError for one below the least."""
@@ -126,6 +139,9 @@ class CompiledProgram:
         table = np.array(rows)  # [budgets, quantiles], NaN = no result
         recordings: list[Recording] = []
         end = float(self.frontier.budgets[-1])
+        means = np.nan_to_num(table).mean(axis=1)
+        lived = self.frontier.promised / np.maximum(means, 1e-9)
+        table = np.clip(table * lived[:, None], 0.0, 1.0)  # so that its mean is the promise
         for column in range(QUANTILES):
             there = ~np.isnan(table[:, column])
             budgets = self.frontier.budgets[there]
@@ -273,11 +289,30 @@ class CompiledProgram:
 
     def explain(self, seconds: float) -> Explanation:
         """Who gets how much of a budget, and what a second more would be worth to each."""
-        return explain(self.name, self.tables, self.frontier, _finite(seconds))
+        seconds = _finite(seconds)
+        return explain(
+            self.name, self.tables, self.frontier, seconds, self.calibration, self.regret
+        )
 
     def advise(self, seconds: float) -> Advice:
-        """Which module is worth speeding up at this budget."""
-        return advise(self.name, self.tables, self.frontier, _finite(seconds))
+        """Which module is worth making faster or better at this budget."""
+        seconds = _finite(seconds)
+        return advise(self.name, self.tables, self.frontier, seconds, self.calibration, self.replay)
+
+    def validate(
+        self,
+        problems: Iterable[Any],
+        *,
+        budgets: Sequence[float] | None = None,
+        clock: Callable[[], Clock] = WallClock,
+        seed: int = 0,
+    ) -> Validation:
+        """Promised against achieved on problems that the profiles never saw.
+
+        budgets: seconds; six from the least to that beyond which nothing is gained by default.
+        Raises AnytimeError for less than two problems or one without a needed attribute.
+        """
+        return validate(self, problems, budgets=budgets or self._budgets(), clock=clock, seed=seed)
 
     def save(self, path: str | Path) -> None:
         """Write the compiled program to a file; `compiler.load` reads it back."""
@@ -297,19 +332,13 @@ class CompiledProgram:
         for seconds in self._budgets():
             allocation = self.allocate(seconds)
             shares = "".join(f"{duration(s):>{width}}" for s in allocation.shares.values())
-            low, high = self._interval(seconds)
+            low, high = self.interval(seconds)
             lines.append(
                 f"{duration(seconds):>10}{shares}   {number(allocation.promised):>8}"
                 f"  [{number(low)}, {number(high)}]"
             )
+        lines.append(certificate(self.regret))
         return "\n".join(line[:100] for line in lines)
-
-    def _interval(self, seconds: float) -> tuple[float, float]:
-        at = [interval.seconds for interval in self.intervals]
-        low = float(np.interp(seconds, at, [interval.low for interval in self.intervals]))
-        high = float(np.interp(seconds, at, [interval.high for interval in self.intervals]))
-        promised = self.promise(seconds)
-        return min(low, promised), max(high, promised)
 
     def _repr_html_(self) -> str:
         first, last = self._budgets(2)

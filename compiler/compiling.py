@@ -10,11 +10,13 @@ from anytime.modules import Module
 from anytime.profiles import Profile
 from anytime.programs import Program, program_of
 from compiler.adaptive import adapt, calibrations
+from compiler.calibrating import as_tables_say, calibrate
 from compiler.compiled import CompiledProgram
 from compiler.division import divide
 from compiler.guarding import guards_of
-from compiler.intervals import intervals_of
 from compiler.objectives import EXPECTED, Objective
+from compiler.regret import regret_bound
+from compiler.replaying import replay_of
 from compiler.tables import tables
 
 
@@ -32,8 +34,9 @@ def compile(
     library: conditional profiles by module name. machine: compile for another machine's rates.
     objective: what a division is chosen for, see `compiler.expected` and its like. adaptive: decide
     each share when its call begins, by what was achieved before, where that is worth more.
-    The result is a contract program with a profile of its own; the intervals of its promises are
-    95 %, by bootstrap over problems.
+    The result is a contract program with a profile of its own. The promises of a program of plain
+    calls are cross-fitted over problems, with 95 % intervals; those of others are what the tables
+    say, with intervals by bootstrap over problems.
     Raises AnytimeError for a missing or unsuitable profile, before any search.
     """
     if isinstance(program, Module):
@@ -42,9 +45,9 @@ def compile(
         raise AnytimeError(
             f"compile takes a program, not {program!r}; decorate a function with @compiler.program"
         )
-    profiles = _needed(program, library)
+    measured = profiles = _needed(program, library)
     if machine is not None:
-        profiles = {name: profile.on(machine) for name, profile in profiles.items()}
+        profiles = {name: profile.on(machine) for name, profile in measured.items()}
     made = tables(program, profiles)
     frontier = divide(made, objective)
     if not len(frontier.budgets):
@@ -55,16 +58,32 @@ def compile(
     policy = None
     if adaptive:
         policy = adapt(program, made, calibrations(program, profiles), frontier, objective)
+    steps = guards_of(profiles)
+    replay = None
+    if _plain(program) and objective is EXPECTED and policy is None:
+        # On the machine of the profiles, so that a faster one never promises less.
+        there = made if machine is None else tables(program, measured)
+        known = frontier if machine is None else divide(there)
+        guards = guards_of(measured)
+        replay = replay_of(program, measured, guards, [t.first for t in there], seed)
+        lived, calibration = calibrate(program, measured, known, replay, seed)
+        frontier = lived if machine is None else calibration.applied(frontier)
+        if machine is not None:
+            replay = replay_of(program, profiles, steps, [t.first for t in made], seed)
+    else:
+        calibration = as_tables_say(program, profiles, frontier, objective, seed)
     names = {profile.machine for profile in profiles.values()}
     return CompiledProgram(
         program=program,
         tables=made,
         frontier=frontier,
-        intervals=intervals_of(program, profiles, frontier, seed),
-        steps=guards_of(profiles),
+        calibration=calibration,
+        steps=steps,
         machine=" and ".join(sorted(names)),
+        regret=regret_bound(program, profiles, made) if _plain(program) else 1.0,
         objective=objective,
         policy=policy,
+        replay=replay,
     )
 
 
@@ -77,3 +96,8 @@ def _needed(program: Program, library: Mapping[str, Profile]) -> dict[str, Profi
             f"anytime.measure({program.name}, problems, seconds=…) measures them all"
         )
     return {name: library[name] for name in needed}
+
+
+def _plain(program: Program) -> bool:
+    """Whether it is calls alone, one after the other."""
+    return len(program.nodes) == len(program.calls) and not program.parallels

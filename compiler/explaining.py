@@ -1,24 +1,37 @@
-"""Why a budget is divided as it is, and what would make the program better."""
+"""Why a budget is divided as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from anytime.errors import AnytimeError
-from anytime.pictures import duration, number
+from anytime.pictures import duration, figure, line_chart, number, sparkline
+from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.costs import stretched
 from compiler.division import Frontier, divide
 from compiler.tables import Table
 
+Floats = NDArray[np.float64]
+COLUMNS = 12  # budgets of the sparkline of a share
+
 
 @dataclass(frozen=True)
 class Price:
-    """What one call gets, and the value of `step` seconds more given to it for nothing."""
+    """What one call gets, and the value of `step` seconds more given to it for nothing.
+
+    a_second: the same as a rate, quality a second. shares: [COLUMNS] share of the budget that it
+    gets at budgets from the least to that beyond which nothing is gained.
+    """
 
     label: str
     share: float
     gain: float
+    a_second: float
+    shares: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -26,6 +39,8 @@ class Explanation:
     """Who gets how much of a budget, and why.
 
     step: seconds that prices are quoted for; less, more: promised with 10 % less or more time.
+    within: the 95 % interval of the promise. regret: no division is better by more, at 95 %.
+    budgets: of the shares over time.
     """
 
     program: str
@@ -35,105 +50,108 @@ class Explanation:
     step: float
     less: float
     more: float
+    within: tuple[float, float]
+    regret: float
+    budgets: tuple[float, ...]
 
     def __repr__(self) -> str:
+        low, high = self.within
         lines = [
-            f"{self.program} in {duration(self.seconds)}: promised {number(self.promised)}; "
-            f"10 % less time {number(self.less)}, 10 % more {number(self.more)}"
+            f"{self.program} in {duration(self.seconds)}: promised {number(self.promised)}"
+            f" [{number(low)}, {number(high)}]; "
+            f"10 % less time {number(self.less)}, 10 % more {number(self.more)}",
+            f"  {'call':<16} {'gets':>9} {'':<16}  {duration(self.step):>8} more  a second"
+            f"  shares {duration(self.budgets[0])} … {duration(self.budgets[-1])}",
         ]
         for price in self.prices:
             share = price.share / self.seconds if self.seconds > 0 else 0.0
-            bar = "█" * round(24 * share)
+            bar = "█" * round(16 * share)
             lines.append(
-                f"  {price.label:<18.18} {duration(price.share):>9} {bar:<24} "
-                f"{duration(self.step)} more for it: {price.gain:+.4f}"
+                f"  {price.label:<16.16} {duration(price.share):>9} {bar:<16}  "
+                f"{price.gain:>+13.4f}  {price.a_second:>+8.2f}  {sparkline(price.shares)}"
             )
+        lines.append(certificate(self.regret))
         return "\n".join(line[:100] for line in lines)
 
-
-@dataclass(frozen=True)
-class Change:
-    """A change to one module and what the program would then promise."""
-
-    label: str
-    what: str
-    promised: float
-    gain: float
-
-
-@dataclass(frozen=True)
-class Advice:
-    """Changes to single modules, the most valuable first."""
-
-    program: str
-    seconds: float
-    promised: float
-    changes: tuple[Change, ...]
-
-    def __repr__(self) -> str:
-        lines = [f"{self.program} in {duration(self.seconds)} promises {number(self.promised)}"]
-        lines += [
-            f"  {change.label} {change.what}: {number(change.promised)} ({change.gain:+.3f})"
-            for change in self.changes
-        ]
-        return "\n".join(line[:100] for line in lines)
+    def _repr_html_(self) -> str:
+        """Shares against the budget, one above the other."""
+        x = list(self.budgets)
+        below = np.zeros(len(x))
+        series: dict[str, tuple[Sequence[float], Sequence[float]]] = {}
+        bands: dict[str, tuple[Sequence[float], Sequence[float], Sequence[float]]] = {}
+        for price in self.prices:
+            above = below + np.array(price.shares)
+            series[price.label] = (x, above.tolist())
+            bands[price.label] = (x, below.tolist(), above.tolist())
+            below = above
+        svg = line_chart(
+            series, bands=bands, x_label="budget [s]", y_label="share", title=self.program
+        )
+        return figure(svg, repr(self))
 
 
-def explain(name: str, tables: Sequence[Table], frontier: Frontier, seconds: float) -> Explanation:
+def certificate(regret: float) -> str:
+    """What the profiles' bands say of the division, as a line."""
+    if regret >= 1:
+        return "  too few problems to bound how much better another division may be"
+    return f"  no division is better by more than {number(regret)} (95 %, from the profiles' bands)"
+
+
+def explain(
+    name: str,
+    tables: Sequence[Table],
+    frontier: Frontier,
+    seconds: float,
+    calibration: Calibration = AS_IT_IS,
+    regret: float = 1.0,
+) -> Explanation:
     """The division of a budget with the price of a little more time for each call.
 
     The price is V(budget, with `step` seconds given to this call alone, re-divided) − V(budget):
     at a fixed division a ladder of results has no meaningful price. Raises AnytimeError below the
     least budget.
     """
-    index = frontier.index(seconds)
-    if index < 0:
+    shares = shares_at(tables, frontier, seconds)
+    if shares is None:
         raise AnytimeError(
             f"{duration(seconds)} is below the least budget of {name!r}, "
             f"{duration(float(frontier.budgets[0]))}"
         )
     promised = frontier.promise(seconds)
     step = 0.05 * seconds
-    shares = stretched(tables, frontier.shares[index].tolist(), seconds)
-    prices = tuple(
-        Price(
-            table.label,
-            shares[table.label],
-            _with(tables, place, table.ahead(step), seconds, promised) - promised,
-        )
-        for place, table in enumerate(tables)
-        if table.rule is None
-    )
+    budgets = np.geomspace(frontier.budgets[0] or 1e-9, frontier.budgets[-1] or 1e-9, COLUMNS)
+    every = [shares_at(tables, frontier, float(budget)) or shares for budget in budgets]
+    over = np.array([[known[label] for label in shares] for known in every])
+    over = over / np.maximum(over.sum(axis=1, keepdims=True), 1e-300)
+    prices: list[Price] = []
+    for place, table in enumerate(tables):
+        if table.rule is not None:
+            continue
+        again = divide([*tables[:place], table.ahead(step), *tables[place + 1 :]])
+        # The division that is promised now still fits, so that the promise cannot be lower.
+        gain = max(calibration.promise(again.promise(seconds)) - promised, 0.0)
+        rate = gain / step if step > 0 else 0.0
+        course = tuple(over[:, len(prices)].tolist())
+        prices.append(Price(table.label, shares[table.label], gain, rate, course))
     return Explanation(
         name,
         seconds,
         promised,
-        prices,
+        tuple(prices),
         step,
         frontier.promise(0.9 * seconds),
         frontier.promise(1.1 * seconds),
+        calibration.interval(promised),
+        regret,
+        tuple(budgets.tolist()),
     )
 
 
-def advise(name: str, tables: Sequence[Table], frontier: Frontier, seconds: float) -> Advice:
-    """Each call's module made twice as fast, ranked by what the program would then promise."""
-    promised = frontier.promise(seconds)
-    changes: list[Change] = []
-    for place, table in enumerate(tables):
-        if table.rule is not None:
-            continue
-        value = _with(tables, place, table.faster(2.0), seconds, promised)
-        changes.append(Change(table.label, "2× faster", value, value - promised))
-    changes.sort(key=lambda change: -change.gain)
-    return Advice(name, seconds, promised, tuple(changes))
-
-
-def _with(
-    tables: Sequence[Table], place: int, changed: Table, seconds: float, promised: float
-) -> float:
-    """What the program promises with one table replaced by a faster one, the time divided anew.
-
-    The division that is promised now still fits, so that the promise cannot be lower.
-    """
-    again = divide([*tables[:place], changed, *tables[place + 1 :]])
-    return max(again.promise(seconds), promised)
+def shares_at(
+    tables: Sequence[Table], frontier: Frontier, seconds: float
+) -> dict[str, float] | None:
+    """Seconds of each call for a budget, with what is left of it; None below the least."""
+    index = frontier.index(seconds)
+    if index < 0:
+        return None
+    return dict(stretched(tables, frontier.shares[index].tolist(), seconds))

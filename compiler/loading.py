@@ -18,10 +18,10 @@ from anytime.programs import Call, Constant, Input, Join, Parallel, Program, ups
 from anytime.structure import behind, groups, paths
 from compiler import costs
 from compiler.adaptive import adapt
+from compiler.calibrating import Calibration
 from compiler.compiled import CompiledProgram
-from compiler.division import Frontier
+from compiler.division import Floats, Frontier
 from compiler.guarding import Steps
-from compiler.intervals import Interval
 from compiler.objectives import EXPECTED, Objective, at_least, cvar, quantile
 from compiler.policies import Seen
 from compiler.storing import SCHEMA, StoredNode, StoredRule, StoredSchedule, StoredTable
@@ -76,9 +76,10 @@ def _restore(file: Path, stored: StoredSchedule, modules: Sequence[Module]) -> C
         objective=objective,
         frontier=frontier,
         policy=policy,
-        intervals=tuple(Interval(*row) for row in stored.intervals),
+        calibration=Calibration(*np.array(stored.calibration).T),
         steps={name: Steps(tuple(rows[0]), tuple(rows[1])) for name, rows in stored.steps.items()},
         machine=stored.machine,
+        regret=stored.regret,
     )
 
 
@@ -268,10 +269,9 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
     promised = np.array(stored.promised, dtype=float)
     if promised[0] < 0 or promised[-1] > 1 + 1e-6 or (np.diff(promised) < 0).any():
         raise AnytimeError(f"{path}: promised qualities must lie in [0, 1] and not decrease")
-    if not stored.intervals or any(low > high for _, low, high in stored.intervals):
-        raise AnytimeError(f"{path}: intervals are missing, or one has its low end above its high")
-    if any(a >= b for (a, *_), (b, *_) in pairwise(stored.intervals)):
-        raise AnytimeError(f"{path}: the budgets of intervals must increase")
+    _check_calibration(path, np.array(stored.calibration, dtype=float).reshape(-1, 4))
+    if not 0 <= stored.regret <= 1:
+        raise AnytimeError(f"{path}: a regret of {stored.regret}; it lies in [0, 1]")
     for name, rows in stored.steps.items():
         if (
             len(rows) != 2
@@ -279,3 +279,14 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
             or min([*rows[0], *rows[1]], default=0) < 0
         ):
             raise AnytimeError(f"{path}: steps.{name} is not two rows of seconds >= 0")
+
+
+def _check_calibration(path: Path, rows: Floats) -> None:
+    if not len(rows) or rows.min() < 0 or rows[:, 1:].max() > 1 + 1e-6:
+        raise AnytimeError(f"{path}: calibration needs a row at least, of numbers in [0, 1]")
+    if (np.diff(rows[:, 0]) <= 0).any() or (np.diff(rows[:, 1:], axis=0) < 0).any():
+        raise AnytimeError(
+            f"{path}: the levels of the calibration must increase, the rest not fall"
+        )
+    if (rows[:, 2] > rows[:, 1]).any() or (rows[:, 1] > rows[:, 3]).any():
+        raise AnytimeError(f"{path}: a promise of the calibration lies outside its interval")

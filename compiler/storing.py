@@ -11,9 +11,9 @@ from anytime.errors import AnytimeError
 from anytime.files import Stored, write_record
 from anytime.joins import Best, Branch, Rule, Several, Tests, Until
 from anytime.programs import Call, Input, Join, Program
+from compiler.calibrating import Calibration
 from compiler.division import Frontier
 from compiler.guarding import Steps
-from compiler.intervals import Interval
 from compiler.objectives import Objective
 from compiler.policies import Policy
 from compiler.tables import Table
@@ -78,8 +78,9 @@ class StoredSchedule(Stored):
     shares: list[list[float]]
     promised: list[float]
     exact: bool
-    intervals: list[tuple[float, float, float]]
+    calibration: list[tuple[float, float, float, float]]
     steps: dict[str, list[list[float]]]
+    regret: float
     seen: dict[str, list[list[float]]] | None
 
 
@@ -93,11 +94,13 @@ class Compiled(Protocol):
     @property
     def frontier(self) -> Frontier: ...
     @property
-    def intervals(self) -> Sequence[Interval]: ...
+    def calibration(self) -> Calibration: ...
     @property
     def steps(self) -> Mapping[str, Steps]: ...
     @property
     def machine(self) -> str: ...
+    @property
+    def regret(self) -> float: ...
     @property
     def objective(self) -> Objective: ...
     @property
@@ -133,8 +136,9 @@ def save(compiled: Compiled, path: Path) -> None:
         shares=frontier.shares.tolist(),
         promised=frontier.promised.tolist(),
         exact=frontier.exact,
-        intervals=[(i.seconds, i.low, i.high) for i in compiled.intervals],
+        calibration=compiled.calibration.rows(),
         steps={name: [list(s.median), list(s.p95)] for name, s in compiled.steps.items()},
+        regret=compiled.regret,
         seen=seen,
     )
     write_record(path, SCHEMA, record)

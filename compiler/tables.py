@@ -167,22 +167,18 @@ def _table(
     sources = [made[source.label] for source in feeding.values()]
     shape = tuple(len(source.levels) for source in sources)
     _joint(name, shape)
-    scale = _scale(profile, counts)
     # Of an arm, the problems on which it is run; where no test was measured, all of them.
     same = {name: answer for name, answer in told.items() if name in profile.features}
+    arrived = [*itertools.product(*(source.levels[1:] for source in sources))]
+    given = np.array(arrived).reshape(len(arrived), len(sources))
+    weights = (profile.given(**same) if same else profile).weights_given([*feeding], given)
+    weights = weights * _scale(profile, counts)
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
+    known = np.stack([weights @ (bins == level) for level in range(len(levels))], axis=-1)
     chances = np.zeros((*shape, len(times), len(levels)))
-    for cell in itertools.product(*(range(size) for size in shape)):
-        if any(level == 0 for level in cell):
-            chances[(*cell, slice(None), 0)] = 1.0  # no input, no result
-            continue
-        values = {
-            parameter: float(source.levels[level])
-            for parameter, source, level in zip(feeding, sources, cell, strict=True)
-        } | same
-        weights = (profile.given(**values) if values else profile).weights * scale
-        weights = weights / max(float(weights.sum()), 1e-300)
-        for level in range(len(levels)):
-            chances[(*cell, slice(None), level)] = weights @ (bins == level)
+    chances[..., 0] = 1.0  # no input, no result
+    filled = (slice(1, None),) * len(sources)
+    chances[filled] = known.reshape(*(size - 1 for size in shape), len(times), len(levels))
     # Ta of [ZR93] §2, moved up to one of the moments.
     first = float(times[min(int(np.searchsorted(times, profile.time_to(0.0))), len(times) - 1)])
     feeds, chances = _once_each(tuple(s.label for s in feeding.values()), chances)

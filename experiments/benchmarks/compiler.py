@@ -15,8 +15,10 @@ from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
 from compiler.division import divide
 from compiler.tables import Table
 from experiments.benchmarks import compiler_adaptive, compiler_constructs
+from experiments.benchmarks.compiler_advice import measure_advice, measure_rover
 from experiments.benchmarks.compiler_constructs import KINDS
 from experiments.benchmarks.compiler_engine import engine_figures
+from experiments.benchmarks.compiler_promises import measure_promises
 from experiments.benchmarks.figures import Benchmark
 from experiments.domains import MACHINE, Domain, cross, domain
 
@@ -68,6 +70,8 @@ def measure(
     figures |= {f"constructs.{kind}": count for kind, count in wrong.items()}
     progress("adaptive schedules on chains with bad luck")
     figures |= compiler_adaptive.measure(3 if quick else 12, seed)
+    for part in (measure_promises, measure_advice, measure_rover):
+        figures |= part(quick=quick, seed=seed, progress=progress)
     figures["dag5.mismatches"] = sum(
         _mismatch(random_program(rng, True, calls=5)) for _ in range(dags)
     )

@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import anytime
 import compiler
 from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock
-from anytime.measuring import CHANGES, STRATA
+from anytime.measuring import CHANGES, COMBINATIONS, STRATA, _design
 
 MACHINE = Machine("m")
 for _name in ("see", "find", "merge", "walk"):
@@ -98,7 +100,7 @@ def test_a_module_runs_at_most_four_times_on_a_problem_and_on_the_last_result():
         assert np.diff(levels).min() > 0.5 * (levels[-1] - levels[0]) / len(levels)
 
 
-def test_several_inputs_share_those_runs_in_a_latin_square():
+def test_several_inputs_are_as_good_as_each_other_in_half_of_the_runs():
     library = measured(stereo, problems())
     for problem in library["merge"].problems:
         pairs = [
@@ -106,8 +108,20 @@ def test_several_inputs_share_those_runs_in_a_latin_square():
             for run in library["merge"].recordings
             if run.problem == problem
         ]
-        assert 2 < len(pairs) <= STRATA
-        assert len({one for one, _ in pairs}) == len({other for _, other in pairs}) == len(pairs)
+        assert 2 < len(pairs) <= COMBINATIONS
+        ones, others = (sorted(set(column)) for column in zip(*pairs, strict=True))
+        assert {(ones[0], others[0]), (ones[-1], others[-1])} <= set(pairs)
+
+
+@given(st.lists(st.integers(1, 4), min_size=2, max_size=4), st.integers(0, 99))
+def test_the_design_of_several_inputs_is_small_and_holds_all_of_a_few(sizes, seed):
+    rows = _design(sizes, seed)
+    assert len(set(rows)) == len(rows) <= COMBINATIONS
+    assert {tuple(0 for _ in sizes), tuple(size - 1 for size in sizes)} <= set(rows)
+    for place, size in enumerate(sizes):
+        assert {row[place] for row in rows} == set(range(size))
+    if np.prod(sizes) <= COMBINATIONS:
+        assert len(rows) == np.prod(sizes)
 
 
 def test_a_module_that_is_called_twice_has_one_profile_with_the_call_in_its_runs():

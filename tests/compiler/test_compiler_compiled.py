@@ -93,9 +93,9 @@ def test_it_promises_more_with_more_time_and_says_how_sure_it_is(schedule):
     budgets = np.linspace(0, 0.3, 100)
     promised = [schedule.promise(t) for t in budgets]
     assert promised == sorted(promised)
-    for interval in schedule.intervals:
-        assert 0 <= interval.low <= interval.high <= 1
-        assert interval.low - 1e-9 <= schedule.promise(interval.seconds) <= interval.high + 1e-9
+    for seconds, promise in zip(budgets, promised, strict=True):
+        low, high = schedule.interval(seconds)
+        assert 0 <= low <= promise <= high <= 1
 
 
 def test_an_allocation_is_the_whole_budget(schedule):
@@ -423,8 +423,9 @@ def test_texts_keep_to_a_hundred_columns(schedule, long_schedule):
 def test_the_table_begins_at_the_least_budget_and_gives_intervals(schedule):
     lines = repr(schedule).splitlines()
     assert lines[1].split() == ["budget", "see", "find", "promised", "95", "%"]
-    assert len(lines) == 8
-    assert all("[" in line for line in lines[2:])
+    assert len(lines) == 9
+    assert all("[" in line for line in lines[2:8])
+    assert "division" in lines[8]
 
 
 def test_an_explanation_divides_the_budget_and_prices_it(schedule):
@@ -552,8 +553,10 @@ def forged(content, *place, value):
         (("tables",), []),
         (("budgets",), []),
         (("promised",), []),
-        (("intervals",), []),
-        (("intervals", 0), [0.1, 0.9, 0.1]),
+        (("calibration",), []),
+        (("calibration", 1), [0.1, 0.1, 0.9, 0.1]),
+        (("calibration", 0), [2.0, 0.0, 0.0, 0.0]),
+        (("regret",), -0.1),
         (("promised", 0), -0.5),
         (("promised", -1), 1.5),
         (("promised", 1), 0.0),

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compiler import equal_shares, maximal, minimal
+from compiler.advising import advise
 from compiler.division import divide, expected_quality, moments_within, output_chances
-from compiler.explaining import advise, explain
+from compiler.explaining import explain
 from compiler.tables import Table
 from experiments.benchmarks.compiler import _mismatch, random_program
 

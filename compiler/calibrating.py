@@ -1,0 +1,218 @@
+"""What a promise is worth: calibrated on problems that the division was not chosen on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anytime.profiles import Profile
+from anytime.programs import Program
+from compiler.division import Frontier, divide, expected_quality, moments_within, value_of
+from compiler.intervals import mean_interval
+from compiler.objectives import Objective
+from compiler.replaying import Replay
+from compiler.tables import Table, tables
+
+Floats = NDArray[np.float64]
+BOOTSTRAPPED = 8  # budgets at which intervals are found by bootstrap
+RESAMPLES = 60  # of the problems, for these
+FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
+DIVIDED = 3  # calls at most of programs that are divided anew for each fold
+KNOTS = 96  # budgets at which promises are calibrated; fewer for many calls
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """From what the tables say of a division to what may be promised, and how surely.
+
+    levels: [K] expected quality by the tables, increasing from 0 to 1. promised, low, high: [K]
+    the promise and the ends of its 95 % interval, none of which falls as the level rises. So more
+    time or a faster module, which never lower the level, never lower the promise.
+    """
+
+    levels: Floats
+    promised: Floats
+    low: Floats
+    high: Floats
+
+    def promise(self, level: float) -> float:
+        """What may be promised of a division that the tables give this level."""
+        return float(self._corrected(np.asarray(level)))
+
+    def interval(self, promised: float) -> tuple[float, float]:
+        """The 95 % interval of a promise; levels of one promise have one interval."""
+        low = float(np.interp(promised, self.promised, self.low))
+        high = float(np.interp(promised, self.promised, self.high))
+        return min(low, promised), max(high, promised)
+
+    def _corrected(self, levels: Floats) -> Floats:
+        # Beyond the knots the correction stays what it is at the last.
+        return levels + np.interp(levels, self.levels, self.promised - self.levels)
+
+    def rows(self) -> list[tuple[float, float, float, float]]:
+        """Level, promise, low and high end of each knot."""
+        return list(zip(*(c.tolist() for c in astuple(self)), strict=True))
+
+    def applied(self, frontier: Frontier) -> Frontier:
+        """The frontier with what may be promised in place of what the tables say."""
+        return replace(frontier, promised=self._corrected(frontier.promised))
+
+
+AS_IT_IS = Calibration(*(np.array([0.0, 1.0]) for _ in range(4)))
+"""Promises what the tables say, and is sure of it."""
+
+
+def calibrate(
+    program: Program,
+    profiles: Mapping[str, Profile],
+    frontier: Frontier,
+    replay: Replay,
+    seed: int = 0,
+) -> tuple[Frontier, Calibration]:
+    """The divisions of a frontier that stand when they are lived again, and what they may promise.
+
+    Cross-fitting: each fold of the problems lives (`compiler.replaying`) the divisions that were
+    chosen without it. One that is worse there than another with less time is dropped, for tables,
+    which are averages over problems, can be mistaken. Isotonic regression of the means over the
+    tables' levels gives the promises.
+    """
+    knots = _knots(frontier, KNOTS * DIVIDED // max(DIVIDED, len(program.calls)))
+    values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
+    standing = _standing(values)
+    kept = standing[
+        np.searchsorted(knots, np.arange(len(frontier.budgets))).clip(0, len(knots) - 1)
+    ]
+    calibration = _isotonic(frontier.promised[knots[standing]], values[:, standing])
+    frontier = replace(
+        frontier,
+        budgets=frontier.budgets[kept],
+        shares=frontier.shares[kept],
+        promised=frontier.promised[kept],
+    )
+    return calibration.applied(frontier), calibration
+
+
+def as_tables_say(
+    program: Program,
+    profiles: Mapping[str, Profile],
+    frontier: Frontier,
+    objective: Objective,
+    seed: int = 0,
+) -> Calibration:
+    """What the tables say is promised; intervals by bootstrap over problems. For programs that
+    cannot be lived again on recordings: with branches, loops, parallels, other objectives."""
+    problems = sorted({p for profile in profiles.values() for p in profile.problems})
+    rng = np.random.default_rng(seed)
+    knots = _knots(frontier, BOOTSTRAPPED)
+    sampled = np.zeros((RESAMPLES, len(knots)))
+    for row in range(RESAMPLES):
+        drawn = rng.integers(0, len(problems), size=len(problems))
+        counts = Counter(problems[int(index)] for index in drawn)
+        resampled = tables(program, profiles, counts)
+        for column, knot in enumerate(knots):
+            moments = moments_within(resampled, frontier.shares[knot].tolist())
+            sampled[row, column] = value_of(resampled, moments, objective)
+    low, high = np.quantile(sampled, [0.025, 0.975], axis=0)
+    said = frontier.promised[knots]
+    low = np.minimum(np.minimum.accumulate(low[::-1])[::-1], said)
+    return Calibration(said, said, low, np.maximum(np.maximum.accumulate(high), said))
+
+
+def _isotonic(levels: Floats, values: Floats) -> Calibration:
+    """From lived qualities [P, K] at the tables' levels [K]."""
+    blocks = _blocks(values.mean(axis=0))
+    pooled = np.array([values[:, block].mean(axis=1) for block in blocks]).T  # [P, blocks]
+    low, high = mean_interval(pooled)
+    sizes = [block.stop - block.start for block in blocks]
+    columns = (
+        pooled.mean(axis=0),
+        np.minimum.accumulate(low[::-1])[::-1],
+        np.maximum.accumulate(high),
+    )
+    promised, low, high = (np.repeat(column, sizes) for column in columns)
+    return Calibration(
+        np.concatenate([[0.0], levels, [1.0 + 1e-9]]),
+        np.concatenate([[0.0], promised, [1.0]]),
+        np.concatenate([[0.0], low, low[-1:]]),
+        np.concatenate([high[:1], high, [1.0]]),
+    )
+
+
+def _unseen(
+    program: Program,
+    profiles: Mapping[str, Profile],
+    frontier: Frontier,
+    replay: Replay,
+    budgets: Floats,
+    seed: int,
+) -> Floats:
+    """Quality achieved on each problem at each budget, [P, budgets], divided without it."""
+    problems = replay.problems
+    fold_of = np.random.default_rng(seed).permutation(len(problems)) % FOLDS
+    every = {problem for profile in profiles.values() for problem in profile.problems}
+    values = np.zeros((len(problems), len(budgets)))
+    for fold in range(min(FOLDS, len(problems))):
+        held = np.flatnonzero(fold_of == fold)
+        others = dict.fromkeys(every - {problems[row] for row in held}, 1.0)
+        chosen = _chosen(tables(program, profiles, others), frontier) if others else frontier
+        for column, budget in enumerate(budgets):
+            # Where the others say that there is no result yet, all of them had one.
+            source = chosen if chosen.index(budget) >= 0 else frontier
+            shares = source.shares[source.index(budget)].tolist()
+            shares[-1] = budget - sum(shares[:-1])
+            values[held, column] = replay.achieved(shares, float(budget), held)
+    return values
+
+
+def _standing(values: Floats) -> NDArray[np.bool_]:
+    """Which columns [K] are not surely (by two standard errors, paired) worse than one before."""
+    standing = np.ones(values.shape[1], dtype=bool)
+    best = values[:, 0]
+    for column in range(1, values.shape[1]):
+        change = values[:, column] - best
+        error = change.std(ddof=1) / np.sqrt(len(change)) if len(change) > 1 else np.inf
+        standing[column] = change.mean() >= -2.0 * error
+        if change.mean() > 0:
+            best = values[:, column]
+    return standing
+
+
+def _chosen(made: Sequence[Table], frontier: Frontier) -> Frontier:
+    """The frontier by these tables: divided anew, or of many calls, for which that takes long, the
+    best of the divisions already known."""
+    if len(made) <= DIVIDED:
+        return divide(made)
+    worth = [expected_quality(made, moments_within(made, row.tolist())) for row in frontier.shares]
+    best, kept = -1.0, np.zeros(len(worth), dtype=bool)
+    for place, value in enumerate(worth):
+        kept[place] = value > best
+        best = max(best, value)
+    return Frontier(frontier.budgets[kept], frontier.shares[kept], np.array(worth)[kept])
+
+
+def _knots(frontier: Frontier, most: int) -> NDArray[np.intp]:
+    """Places of the frontier, about `most`, spread over promised quality and over time."""
+    count = len(frontier.budgets)
+    if count <= most:
+        return np.arange(count)
+    ends = float(frontier.promised[0]), float(frontier.promised[-1])
+    by_quality = np.searchsorted(frontier.promised, np.linspace(*ends, most // 2))
+    by_time = np.linspace(0, count - 1, most // 2).round()
+    return np.unique(np.concatenate([by_quality, by_time]).clip(0, count - 1).astype(np.intp))
+
+
+def _blocks(means: Floats) -> list[slice]:
+    """Runs of neighbours that isotonic regression gives one value: pool adjacent violators."""
+    blocks: list[tuple[float, int, int]] = []
+    for place, mean in enumerate(means):
+        value, start, end = float(mean), place, place + 1
+        while blocks and blocks[-1][0] >= value:
+            before, first, last = blocks.pop()
+            value = (before * (last - first) + value * (end - start)) / (end - first)
+            start = first
+        blocks.append((value, start, end))
+    return [slice(start, end) for _, start, end in blocks]
