@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
+import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -54,10 +57,7 @@ def cp_sat(factors: Sequence[Factor], budget: int, limit: float) -> tuple[int, f
     Returns the level, the CPU-seconds of one worker for the search, and whether it was ended by
     its limit of seconds. Raises ImportError without OR-tools.
     """
-    import time
-
-    from ortools.sat.python import cp_model
-
+    cp_model: Any = importlib.import_module("ortools.sat.python.cp_model")
     model = cp_model.CpModel()
     sizes = {n: s for f in factors for n, s in zip(f.scope, f.table.shape, strict=True)}
     levels = {name: model.new_int_var(0, size - 1, name) for name, size in sizes.items()}
