@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -212,7 +212,7 @@ class CompiledProgram:
                 # A share that others have used up still leaves time for a first result.
                 ends = max(ends, min(clock.now() + self.tables[place].first, hard))
             # A generator with a guard is held to its share by it, the others by their deadline.
-            own = Deadline(clock, hard if held else ends)
+            own = replace(deadline, at=hard if held else ends)
             may_step = held or Run.may_step
             parts[call.label], _ = execute(
                 call.module,
