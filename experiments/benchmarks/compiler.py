@@ -14,6 +14,7 @@ from compiler import CompiledProgram, compile
 from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
 from compiler.division import divide
 from compiler.tables import Table
+from experiments.benchmarks import compiler_export, compiler_interruption
 from experiments.benchmarks.figures import Benchmark
 from experiments.domains import MACHINE, Domain, cross, domain
 
@@ -51,6 +52,12 @@ def measure(
     progress(f"running on {UNSEEN} domains never seen")
     unseen = [domain(FAMILY, SIZE, index, seed + 1) for index in range(UNSEEN)]
     figures |= _unseen(compiled, unseen, count=8 if quick else 16)
+    progress("sequences of contracts, and the same in C")
+    figures |= compiler_interruption.measure(compiled, unseen, quick=quick, seed=seed)
+    in_c, not_measured = compiler_export.measure(
+        compiled, random_program, programs=10 if quick else 40, seed=seed
+    )
+    figures |= in_c
     trees, dags = (200, 100) if quick else (2000, 1000)
     progress(f"{trees} trees and {dags} DAGs against brute force")
     rng = np.random.default_rng(seed)
@@ -64,6 +71,7 @@ def measure(
         "problems": problems,
         "unseen": UNSEEN,
         "unseen_error": "of the program's mean; unseen_below_paired: of the difference",
+        "not_measured": not_measured,
     }
     return Benchmark("compiler", figures, settings, seed)
 
