@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,20 @@ class Curve:
 
     lengths: [K] seconds at which it rises, increasing. qualities: [K] from there on, increasing.
     Between two lengths a contract is worth what the shorter one is, so no others need be tried.
+    sampled: only the lengths are known, as those of a contract module are that was measured at some
+    lengths; what lies between them may be better than is promised.
     """
 
     lengths: Floats
     qualities: Floats
+    sampled: bool = False
+
+    @property
+    def following(self) -> Floats:
+        """The shortest contract that may be better than each step, [K + 1]: than none, than the
+        first, …, than the last."""
+        after = self.lengths[:-1] if self.sampled else self.lengths[1:]
+        return np.concatenate([self.lengths[:1], after, [np.inf]])
 
     def quality(self, lengths: Floats) -> Floats:
         """Expected quality of contracts of these lengths, [n]; 0 below the shortest."""
@@ -33,9 +43,10 @@ class Curve:
 
 
 def curve_of(profile: Profile) -> Curve:
-    """The curve of a contract's profile. Raises AnytimeError if it never has a result."""
+    """The curve of a contract module's profile, measured at some lengths. Raises AnytimeError if it
+    never has a result."""
     times = profile.times
-    return curve(times, profile.mean(times), profile.module)
+    return replace(curve(times, profile.mean(times), profile.module), sampled=True)
 
 
 def curve(lengths: Floats, qualities: Floats, name: str) -> Curve:

@@ -22,6 +22,7 @@ from compiler.sequencing import (
     acceleration_ratio,
     best_sequence,
     expected_quality,
+    least_ratio,
     tuned_doubling,
 )
 
@@ -99,9 +100,9 @@ def interruptible(
     interruption: when it comes: a distribution of seconds (with `.sf`, as those of scipy.stats), a
     list of observed times, or one predicted time; by default nothing is known. The sequence is the
     best one for it, exactly [ZCC03].
-    robustness: at no time may it be behind one contract of that time / robustness. By default 4,
-    which is always possible, if nothing is known or a single time is predicted [AK21]; else
-    unbounded.
+    robustness: at no time may it be behind one contract of that time / robustness. By default 4 if
+    nothing is known or a single time is predicted [AK21], or the least that the measured lengths
+    allow; else unbounded.
     adaptive: choose each contract by what is achieved, for a module that takes `rng`, so that it
     may be luckier another time, and has an `estimate` to see it by.
     A module that registers results while it runs is interruptible as it is. One that takes `memory`
@@ -117,9 +118,7 @@ def interruptible(
         return _made(native, native.name, profile, profile, expected, doubling, 1.0)
     name = f"{module.name}_interruptible"
     filled = _filled(contract)
-    enough = isinstance(contract, CompiledProgram) and not any(
-        call.module.contract for call in contract.program.calls
-    )
+    enough = isinstance(contract, CompiledProgram) and not _has_contracts(contract)
     run = contract_of(contract)
     shell = replace(module, filled=filled, generator=True)
     if adaptive:
@@ -136,7 +135,7 @@ def interruptible(
         made = replace(shell, function=refine)
         expected = _expected(own, survival)
         return _made(made, name, profile, own, expected, doubling, math.inf, policy=policy)
-    bound = _bound(robustness, interruption)
+    bound = _bound(robustness, interruption, steps)
     lengths = best_sequence(steps, survival, bound)
     own = profile_of_sequence(name, profile, lengths)
     refine = one_after_the_other(run, module.name, in_turn(lengths), again=False, enough=enough)
@@ -192,6 +191,7 @@ def _described(
     if isinstance(contract, CompiledProgram):
         frontier = contract.frontier
         steps = curve(frontier.budgets, frontier.promised, contract.name)
+        steps = replace(steps, sampled=_has_contracts(contract))
         return contract.module, contract.profile, steps
     if not isinstance(contract, Module):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise AnytimeError(f"interruptible takes a module or a compiled program, not {contract!r}")
@@ -202,6 +202,10 @@ def _described(
             f"Give anytime.measure({contract.name}, problems, seconds=…)"
         )
     return contract, library[contract.name], curve_of(library[contract.name])
+
+
+def _has_contracts(compiled: CompiledProgram) -> bool:
+    return any(call.module.contract for call in compiled.program.calls)
 
 
 def _native(contract: Module | CompiledProgram) -> Module | None:
@@ -224,12 +228,12 @@ def _filled(contract: Module | CompiledProgram) -> frozenset[str]:
     return frozenset({"rng"} if drawn else ())
 
 
-def _bound(robustness: float | None, interruption: Interruption | None) -> float:
+def _bound(robustness: float | None, interruption: Interruption | None, steps: Curve) -> float:
     if robustness is None:
         predicted = interruption is None or isinstance(interruption, int | float)
-        return WORST if predicted else math.inf
+        return max(WORST, least_ratio(steps)) if predicted else math.inf
     if not robustness >= 1:
-        raise AnytimeError(f"robustness={robustness}; give a factor >= 1 (4 is always possible)")
+        raise AnytimeError(f"robustness={robustness}; give a factor >= 1, such as 4")
     return robustness
 
 

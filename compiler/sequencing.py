@@ -85,7 +85,7 @@ def best_sequence(curve: Curve, survival: Survival, ratio: float = math.inf) -> 
 
 def least_ratio(curve: Curve) -> float:
     """The least acceleration ratio that a sequence can have for this profile, at most 4."""
-    following = _following(curve)
+    following = curve.following
 
     def worth(labels: _Labels, ends: Floats, level: int) -> Floats:
         return np.minimum(labels.worth, -ends / following[labels.levels])
@@ -108,7 +108,7 @@ def acceleration_ratio(curve: Curve, lengths: tuple[float, ...]) -> float:
     if before[-1] < len(curve.lengths):
         return math.inf
     gains = before[:-1] < len(curve.lengths)
-    return float((np.cumsum(lengths) / _following(curve)[before[:-1]])[gains].max())
+    return float((np.cumsum(lengths) / curve.following[before[:-1]])[gains].max())
 
 
 def doubled(curve: Curve, first: float) -> tuple[float, ...]:
@@ -134,11 +134,6 @@ def tuned_doubling(curve: Curve, survival: Survival) -> tuple[float, ...]:
     return doubled(curve, float(firsts[expected.argmax()]))
 
 
-def _following(curve: Curve) -> Floats:
-    """The length of the next better contract by level, [K + 1]; none after the last."""
-    return np.append(curve.lengths, math.inf)
-
-
 def _extended(
     curve: Curve,
     worth: _Worth,
@@ -150,7 +145,7 @@ def _extended(
 
     hope: what a continuation may add at most; sequences that cannot become the best are dropped.
     """
-    following = _following(curve)
+    following = curve.following
     start = np.zeros(1, dtype=np.intp)
     labels = _Labels(np.zeros(1), np.zeros(1), start, start)
     best = -math.inf

@@ -49,7 +49,7 @@ def measure(
         **sequences(rng, random=10 if quick else 60),
         **predictions(),
         **interrupted(compiled, unseen[: 40 if quick else 100], seed),
-        **retries(rng, count=200 if quick else 1000),
+        **retries(rng, count=200 if quick else 600),
     }
 
 
@@ -323,8 +323,9 @@ class _Puzzle:
 
 
 def retries(rng: np.random.Generator, count: int) -> Figures:
-    """Contracts chosen by what is achieved, for a module with luck, on problems never seen; beside
-    the best sequence, which takes a failure for the problem's fault."""
+    """Contracts chosen by what is achieved, on problems never seen, beside the best sequence, which
+    takes a failure for the problem's fault: for a module with luck, and for one whose results
+    differ by problem alone (`misused`)."""
 
     @anytime.module(quality=lambda found: found, estimate=lambda found: found)
     def guess(hard: float, *, seconds: float, rng: np.random.Generator) -> float | None:
@@ -332,34 +333,51 @@ def retries(rng: np.random.Generator, count: int) -> Figures:
         lucky = rng.random() < 1 - np.exp(-seconds / (0.1 * hard))
         return float(rng.uniform(0.5, 1)) if lucky else None
 
-    machine = Machine("m").with_rate("guess", 1.0)
-    puzzles = [_Puzzle(float(hard)) for hard in np.exp(rng.normal(0, 0.5, size=300))]
-    library = anytime.measure(guess, puzzles, seconds=1.0, clock=lambda: WorkClock(machine))
-    gains: list[float] = []
-    errors: list[float] = []
-    for when in (stats.uniform(0, 0.4), stats.expon(scale=0.1), stats.norm(0.2, 0.02)):
-        modules = [
-            interruptible(guess, library, interruption=when, adaptive=adaptive)
-            for adaptive in (False, True)
-        ]
-        ends = np.asarray(when.ppf((np.arange(count) + 0.5) / count))
-        hard = np.exp(rng.normal(0, 0.5, size=count))
-        sequence, policy = (_guessed(module, machine, hard, ends) for module in modules)
-        gains.append(policy / sequence - 1)
-        errors.append(abs(policy - modules[1].expected))
+    @anytime.module(quality=lambda found: found, estimate=lambda found: found)
+    def dig(hard: float, *, seconds: float, rng: np.random.Generator) -> float | None:
+        anytime.charge(seconds)
+        return float(1 - np.exp(-seconds / (0.1 * hard**3)))
+
+    gains, errors = _retried(guess, rng, count)
+    losses, _ = _retried(dig, rng, count)
     return {
         "retry.gain_mean": float(np.mean(gains)),
         "retry.gain_min": min(gains),
         "retry.promise_error": max(errors),
+        "retry.misused_mean": float(np.mean(losses)),
+        "retry.misused_min": min(losses),
     }
 
 
-def _guessed(module: Interruptible, machine: Machine, hard: np.ndarray, ends: np.ndarray) -> float:
+def _retried(
+    module: Module, rng: np.random.Generator, count: int
+) -> tuple[list[float], list[float]]:
+    """Gains of the policy over the best sequence, as shares, and errors of its promise, for three
+    distributions of the interruption."""
+    machine = Machine("m").with_rate(module.name, 1.0)
+    puzzles = [_Puzzle(float(hard)) for hard in np.exp(rng.normal(0, 0.5, size=300))]
+    library = anytime.measure(module, puzzles, seconds=1.0, clock=lambda: WorkClock(machine))
+    gains: list[float] = []
+    errors: list[float] = []
+    for when in (stats.uniform(0, 0.4), stats.expon(scale=0.1), stats.norm(0.2, 0.02)):
+        modules = [
+            interruptible(module, library, interruption=when, adaptive=adaptive)
+            for adaptive in (False, True)
+        ]
+        ends = np.asarray(when.ppf((np.arange(count) + 0.5) / count))
+        hard = np.exp(rng.normal(0, 0.5, size=count))
+        sequence, policy = (_found(each, machine, hard, ends) for each in modules)
+        gains.append(policy / sequence - 1)
+        errors.append(abs(policy - modules[1].expected))
+    return gains, errors
+
+
+def _found(module: Interruptible, machine: Machine, hard: np.ndarray, ends: np.ndarray) -> float:
     total = 0.0
     for index, (each, end) in enumerate(zip(hard.tolist(), ends.tolist(), strict=True)):
         clock = WorkClock(machine)
         until = Deadline(clock, event=lambda clock=clock, end=end: clock.now() >= end)
         result = anytime.run(module, each, deadline=until, rng=np.random.default_rng(index))
-        seen = [change.estimate for change in result.history if change.seconds <= end]
-        total += seen[-1] or 0.0 if seen else 0.0
+        in_time = (change.estimate or 0.0 for change in result.history if change.seconds <= end)
+        total += max(in_time, default=0.0)
     return total / len(hard)

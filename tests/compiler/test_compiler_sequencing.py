@@ -168,3 +168,18 @@ def test_a_ratio_that_nothing_keeps_is_refused_and_the_least_is_named():
     curve = Curve(np.array([1.0, 2.0, 3.0]), np.array([0.3, 0.6, 1.0]))
     with pytest.raises(AnytimeError, match=r"the least ratio is 2$"):
         best_sequence(curve, log_uniform(curve), 1.2)
+
+
+@given(steps=st.lists(st.floats(0.05, 3.0), min_size=2, max_size=20))
+def test_where_only_some_lengths_were_measured_the_ratio_counts_lengths_alone(steps):
+    """What lies between them may be as good as the next: time over the longest that is done."""
+    lengths = np.cumsum(steps)
+    curve = Curve(lengths, np.arange(1, len(steps) + 1) / len(steps), sampled=True)
+    sequence = doubled(curve, float(lengths[0]))
+    known = lengths[np.searchsorted(lengths, np.array(sequence) * (1 + 1e-12), side="right") - 1]
+    rises = np.flatnonzero(np.diff(np.maximum.accumulate(known), prepend=0.0) > 0)
+    longest = np.concatenate([known[:1], np.maximum.accumulate(known)[:-1]])
+    until = int(rises[-1]) + 1  # once it has the best, nothing is behind any more
+    worst = (np.cumsum(sequence) / longest)[:until].max()
+    assert acceleration_ratio(curve, sequence) == pytest.approx(worst)
+    assert acceleration_ratio(curve, sequence) >= least_ratio(curve) - 1e-9
