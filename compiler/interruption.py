@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,13 @@ from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile
 from anytime.programs import Input
 from compiler.compiled import CompiledProgram
-from compiler.contracts import contract_of, in_turn, one_after_the_other, profile_of_sequence
+from compiler.contracts import (
+    Following,
+    contract_of,
+    in_turn,
+    one_after_the_other,
+    profile_of_sequence,
+)
 from compiler.curves import Curve, curve, curve_of
 from compiler.deadlines import WORST, Interruption, Survival, log_uniform, survival_of
 from compiler.retrying import Policy, retrying
@@ -114,74 +121,55 @@ def interruptible(
     doubling = expected_quality(steps, tuned_doubling(steps, survival), survival)
     native = _native(contract)
     if native is not None:
-        expected = _expected(profile, survival)
-        return _made(native, native.name, profile, profile, expected, doubling, 1.0)
+        return Interruptible(
+            **_fields(native),
+            contract_profile=profile,
+            profile=profile,
+            expected=_expected(profile, survival),
+            doubling=doubling,
+            ratio=1.0,
+        )
     name = f"{module.name}_interruptible"
-    filled = _filled(contract)
+    if adaptive:
+        _check_luck(module, _filled(contract), robustness)
+        policy, own = retrying(module, profile, survival)
+        made = _sequence(
+            contract, module, lambda _, at, seen: policy.following(at, seen), again=True
+        )
+        return Interruptible(
+            **_fields(replace(made, name=name)),
+            contract_profile=profile,
+            profile=replace(own, module=name),
+            policy=policy,
+            expected=_expected(own, survival),
+            doubling=doubling,
+            ratio=math.inf,
+        )
+    lengths = best_sequence(steps, survival, _bound(robustness, interruption, steps))
+    made = _sequence(contract, module, in_turn(lengths), again=False)
+    return Interruptible(
+        **_fields(replace(made, name=name)),
+        contract_profile=profile,
+        profile=profile_of_sequence(name, profile, lengths),
+        lengths=lengths,
+        expected=expected_quality(steps, lengths, survival),
+        doubling=doubling,
+        ratio=acceleration_ratio(steps, lengths),
+    )
+
+
+def _fields(module: Module) -> dict[str, Any]:
+    return {field.name: getattr(module, field.name) for field in fields(Module)}
+
+
+def _sequence(
+    contract: Module | CompiledProgram, module: Module, following: Following, *, again: bool
+) -> Module:
+    """The module with its function in place of one contract: contracts one after the other."""
     enough = isinstance(contract, CompiledProgram) and not _has_contracts(contract)
     run = contract_of(contract)
-    shell = replace(module, filled=filled, generator=True)
-    if adaptive:
-        _check_luck(module, filled, robustness)
-        policy, own = retrying(module, profile, survival)
-        own = replace(own, module=name)
-        refine = one_after_the_other(
-            run,
-            module.name,
-            lambda _, elapsed, seen: policy.following(elapsed, seen),
-            again=True,
-            enough=enough,
-        )
-        made = replace(shell, function=refine)
-        expected = _expected(own, survival)
-        return _made(made, name, profile, own, expected, doubling, math.inf, policy=policy)
-    bound = _bound(robustness, interruption, steps)
-    lengths = best_sequence(steps, survival, bound)
-    own = profile_of_sequence(name, profile, lengths)
-    refine = one_after_the_other(run, module.name, in_turn(lengths), again=False, enough=enough)
-    return _made(
-        replace(shell, function=refine),
-        name,
-        profile,
-        own,
-        expected_quality(steps, lengths, survival),
-        doubling,
-        acceleration_ratio(steps, lengths),
-        lengths=lengths,
-    )
-
-
-def _made(
-    module: Module,
-    name: str,
-    contract_profile: Profile,
-    profile: Profile,
-    expected: float,
-    doubling: float,
-    ratio: float,
-    *,
-    lengths: tuple[float, ...] = (),
-    policy: Policy | None = None,
-) -> Interruptible:
-    return Interruptible(
-        name=name,
-        function=module.function,
-        parameters=module.parameters,
-        filled=module.filled,
-        quality=module.quality,
-        cost=module.cost,
-        estimate=module.estimate,
-        problems=module.problems,
-        features=module.features,
-        generator=module.generator,
-        contract_profile=contract_profile,
-        profile=profile,
-        lengths=lengths,
-        policy=policy,
-        expected=expected,
-        doubling=doubling,
-        ratio=ratio,
-    )
+    refine = one_after_the_other(run, module.name, following, again=again, enough=enough)
+    return replace(module, function=refine, filled=_filled(contract), generator=True)
 
 
 def _described(

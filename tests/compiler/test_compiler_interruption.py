@@ -291,6 +291,13 @@ def test_a_module_that_registers_as_it_goes_is_interruptible_as_it_is():
     assert "as it is" in repr(patient)
 
 
+def test_what_is_interruptible_already_stays_as_it_is(library):
+    patient = compiler.interruptible(solve, library)
+    again = compiler.interruptible(patient, {patient.name: patient.profile})
+    assert again.function is patient.function
+    assert again.name == patient.name
+
+
 def test_so_is_a_program_of_such_a_module_alone():
     library = anytime.measure(see, problems(), seconds=1.0, clock=clock)
     patient = compiler.interruptible(compiler.compile(see, library))
