@@ -66,7 +66,9 @@ class _Best:
 
     def seen(self, value: Any, change: Change) -> None:
         """A result within a contract: better than the best only if that can be seen."""
-        if change.estimate is not None and change.estimate > (self.estimate or 0.0):
+        if change.estimate is None:
+            return
+        if self.estimate is None or change.estimate > self.estimate:
             self.run.record(value)
             self.estimate = change.estimate
 
@@ -102,12 +104,12 @@ def one_after_the_other(
                 run.cut = True  # not the end of the sequence but the deadline ends it
                 return
             part = contract(inputs, run.deadline.sooner(seconds * SLACK), filled, best.seen)
-            if part.fault is not None:
-                raise AnytimeError(f"a contract of {name} for {seconds:.4g} s failed: {part.fault}")
             run.cut = run.cut or run.deadline.interrupted()
             if run.cut and part.elapsed < seconds:
                 return  # what was cut is no result of a contract of this length
             best.finished(part, seconds)
+            if part.fault is not None:
+                raise AnytimeError(f"a contract of {name} for {seconds:.4g} s failed: {part.fault}")
             done += 1
             if enough and part.status is Status.COMPLETE:
                 return

@@ -38,9 +38,9 @@ from compiler.sequencing import (
 class Interruptible(Module):
     """A module that may be interrupted at any time, made of contracts run one after the other.
 
-    contract: the profile of one contract. profile: its own, with a result whenever a contract is
-    done. lengths: seconds that each contract is told; none for a module that is interruptible as it
-    is, or whose contracts a policy chooses. policy: chooses by time and quality achieved.
+    contract_profile: of one contract. profile: its own, with a result whenever a contract is done.
+    lengths: seconds that each contract is told; none for a module that is interruptible as it is,
+    or whose contracts a policy chooses. policy: chooses by time and quality achieved.
     expected, doubling: expected quality when the interruption comes as assumed, of this and of
     doubling from the best first length. ratio: how many times as long as one contract it takes, at
     worst, to be as good as that; inf where there is no bound.

@@ -153,6 +153,17 @@ def test_the_best_result_is_kept_by_its_estimate():
     assert estimates == sorted(estimates)
 
 
+def test_a_result_that_is_estimated_at_nothing_is_a_result():
+    @anytime.module(quality=lambda answer: 0.5, estimate=lambda answer: 0.0, name="solve")
+    def modest(hard, *, seconds):
+        anytime.charge(seconds)
+        return "something"
+
+    library = anytime.measure(modest, problems(3), seconds=1.0, clock=clock)
+    patient = compiler.interruptible(modest, library)
+    assert anytime.run(patient, 1.0, deadline=Deadline(clock())).value == "something"
+
+
 def test_without_an_estimate_the_longest_contract_speaks(library):
     patient = compiler.interruptible(solve, library)
     result = anytime.run(patient, 1.0, deadline=Deadline(clock()))
