@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from anytime.errors import AnytimeError
@@ -88,10 +88,15 @@ class WorkClock:
 
 @dataclass(frozen=True)
 class Deadline:
-    """An absolute time on one clock. `inf` is no deadline; one that has passed means stop now."""
+    """An absolute time on one clock, or an event that nobody can date, whichever comes first.
+
+    at: seconds on the clock; `inf` is no deadline; one that has passed means stop now.
+    event: asked at every check-point; true interrupts.
+    """
 
     clock: Clock
     at: float = math.inf
+    event: Callable[[], bool] | None = None
 
     @classmethod
     def after(cls, seconds: float, clock: Clock | None = None) -> Deadline:
@@ -102,12 +107,31 @@ class Deadline:
         return cls(clock, clock.now() + seconds)
 
     def remaining(self) -> float:
-        """Seconds left, negative when it has passed."""
-        return self.at - self.clock.now()
+        """Seconds left as far as is known: negative when it has passed, 0 once interrupted."""
+        left = self.at - self.clock.now()
+        return min(left, 0.0) if self.interrupted() else left
+
+    def interrupted(self) -> bool:
+        """Whether the event has come."""
+        return self.event is not None and self.event()
 
     def expired(self) -> bool:
-        return self.clock.now() >= self.at
+        return self.clock.now() >= self.at or self.interrupted()
 
     def sooner(self, seconds: float) -> Deadline:
         """This deadline or the one `seconds` from now, whichever comes first."""
-        return Deadline(self.clock, min(self.at, self.clock.now() + seconds))
+        return replace(self, at=min(self.at, self.clock.now() + seconds))
+
+    def earlier(self, other: Deadline) -> Deadline:
+        """This deadline or another, whichever comes first; of one on another clock, whose times
+        cannot be compared, the event alone."""
+        at = min(self.at, other.at) if other.clock == self.clock else self.at
+        return Deadline(self.clock, at, _either(self.event, other.event))
+
+
+def _either(
+    one: Callable[[], bool] | None, other: Callable[[], bool] | None
+) -> Callable[[], bool] | None:
+    if one is None or other is None or one == other:
+        return one or other
+    return lambda: one() or other()

@@ -235,9 +235,7 @@ def bounded(
         deadline = Deadline.after(
             seconds or 0.0, clock or (outer.deadline.clock if outer else WallClock())
         )
-    if outer is None or outer.deadline.clock != deadline.clock:
-        return deadline
-    return Deadline(deadline.clock, min(deadline.at, outer.deadline.at))
+    return deadline if outer is None else deadline.earlier(outer.deadline)
 
 
 def seed_of(*what: object) -> int:
@@ -318,7 +316,7 @@ def _generate(
 ) -> bool:
     steps = current.module.function(*inputs, **filled)
     try:
-        while may_step(current):
+        while not current.deadline.interrupted() and may_step(current):
             # Around each step alone: a context variable set in a generator leaks to its caller.
             token = calling.current.set(current)
             try:

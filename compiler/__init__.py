@@ -4,8 +4,10 @@ from compiler.baselines import equal_shares, maximal, minimal
 from compiler.compiled import CompiledProgram
 from compiler.compiling import compile
 from compiler.constructs import all_of, any_of, branch, choose, loop, output, parallel
+from compiler.interruption import Interruptible, interruptible
 from compiler.loading import load
 from compiler.objectives import at_least, cvar, expected, quantile
+from compiler.processors import round_robin
 from compiler.reading import program
 
 __all__ = [
@@ -15,10 +17,12 @@ __all__ = [
     "at_least",
     "branch",
     "choose",
+    "Interruptible",
     "compile",
     "cvar",
     "equal_shares",
     "expected",
+    "interruptible",
     "load",
     "loop",
     "maximal",
@@ -27,4 +31,5 @@ __all__ = [
     "parallel",
     "program",
     "quantile",
+    "round_robin",
 ]

@@ -1,4 +1,4 @@
-"""Commands of the compiler: compile, explain, advise."""
+"""Commands of the compiler: compile, explain, advise, export."""
 
 from __future__ import annotations
 
@@ -27,6 +27,14 @@ def declare(commands: Any) -> None:
         parser = add_command(commands, name, run, summary)
         parser.add_argument("file", type=Path, help="what `anytime compile` wrote")
         parser.add_argument("--seconds", type=positive, required=True, help="the budget")
+    summary = "a compiled program for those who have no Python"
+    parser = commands.add_parser("export", help=summary, description=summary)
+    parser.add_argument("file", type=Path, help="what `anytime compile` wrote")
+    parser.add_argument("--c", type=target, metavar="FILE.h", help="a header for C99 and C++")
+    parser.add_argument(
+        "--json", type=target, metavar="FILE", dest="tables", help="the same tables as JSON"
+    )
+    parser.set_defaults(run=export, json=False)
 
 
 def compile_program(options: argparse.Namespace) -> Answer:
@@ -69,3 +77,20 @@ def advise(options: argparse.Namespace) -> Answer:
         repr(found),
         {"promised": found.promised, "gains": {c.label: c.gain for c in found.changes}},
     )
+
+
+def export(options: argparse.Namespace) -> Answer:
+    """Write the divisions of a compiled program as a C header, as JSON, or both."""
+    from compiler.exporting import exported, write_json
+    from compiler.headers import write_header
+    from compiler.loading import inspect
+
+    if options.c is None and options.tables is None:
+        raise AnytimeError("nothing to write; add --c FILE.h, --json FILE, or both")
+    tables = exported(inspect(options.file))
+    if options.c is not None:
+        write_header(tables, options.c)
+    if options.tables is not None:
+        write_json(tables, options.tables)
+    written = ", ".join(str(file) for file in (options.c, options.tables) if file is not None)
+    return Answer(f"{len(tables.from_ms)} divisions of {tables.name} written to {written}")

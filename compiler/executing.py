@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -95,7 +95,7 @@ class Execution:
             self._skipped.add(call.label)  # what it needs never came, or is of an arm not taken
             return []
         hard, ends, held = self._limits(call, clock)
-        own = Deadline(clock, hard if held else ends)
+        own = replace(self.deadline, clock=clock, at=hard if held else ends)
         may_step = held or Run.may_step
         self.parts[call.label], _ = execute(
             call.module,

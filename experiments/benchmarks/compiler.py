@@ -14,7 +14,12 @@ from compiler import CompiledProgram, compile
 from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
 from compiler.division import divide
 from compiler.tables import Table
-from experiments.benchmarks import compiler_adaptive, compiler_constructs
+from experiments.benchmarks import (
+    compiler_adaptive,
+    compiler_constructs,
+    compiler_export,
+    compiler_interruption,
+)
 from experiments.benchmarks.compiler_advice import measure_advice, measure_rover
 from experiments.benchmarks.compiler_constructs import KINDS
 from experiments.benchmarks.compiler_engine import engine_figures
@@ -56,6 +61,12 @@ def measure(
     progress(f"running on {UNSEEN} domains never seen")
     unseen = [domain(FAMILY, SIZE, index, seed + 1) for index in range(UNSEEN)]
     figures |= _unseen(compiled, unseen, count=8 if quick else 16)
+    progress("sequences of contracts, and the same in C")
+    figures |= compiler_interruption.measure(compiled, unseen, quick=quick, seed=seed)
+    in_c, not_measured = compiler_export.measure(
+        compiled, random_program, programs=10 if quick else 40, seed=seed
+    )
+    figures |= in_c
     trees, dags = (200, 100) if quick else (2000, 1000)
     progress(f"{trees} trees and {dags} DAGs against brute force")
     rng = np.random.default_rng(seed)
@@ -77,12 +88,15 @@ def measure(
     )
     engine, how = engine_figures(quick, seed, progress)
     figures |= engine
+    if engine["vs_cpsat"] is None:
+        not_measured["vs_cpsat"] = str(how["vs_cpsat"])
     settings = how | {
         "family": FAMILY,
         "size": SIZE,
         "problems": problems,
         "unseen": UNSEEN,
         "unseen_error": "of the program's mean; unseen_below_paired: of the difference",
+        "not_measured": not_measured,
     }
     return Benchmark("compiler", figures, settings, seed)
 

@@ -122,7 +122,7 @@ def _races(rng: np.random.Generator, settings: dict[str, object], limit: float) 
         level, spent, ended = rivals.cp_sat(factors, budget, limit)
     except ImportError:
         figures["vs_cpsat"] = None
-        settings["not_measured"] = {"vs_cpsat": "OR-tools is missing: pip install -e '.[bench]'"}
+        settings["vs_cpsat"] = "OR-tools is missing: pip install -e '.[bench]'"
         return figures
     figures["vs_cpsat"] = spent / took["ours"]
     figures["cpsat.level_missing"] = int(_levels_within(costs)[budget]) - level

@@ -80,3 +80,49 @@ def test_the_sooner_deadline_is_never_later_than_either(first, second):
 def test_a_deadline_that_is_no_number_is_refused():
     with pytest.raises(AnytimeError, match="NaN"):
         Deadline.after(math.nan)
+
+
+# Events
+
+
+def test_an_event_is_a_deadline_that_nobody_can_date():
+    pressed = []
+    clock = WorkClock(MACHINE)
+    deadline = Deadline(clock, event=lambda: bool(pressed))
+    assert (deadline.remaining(), deadline.expired()) == (math.inf, False)
+    pressed.append("bumper")
+    assert (deadline.remaining(), deadline.expired()) == (0.0, True)
+    assert deadline.interrupted()
+
+
+def test_a_deadline_that_has_passed_stays_so_whatever_the_event():
+    clock = WorkClock(MACHINE)
+    deadline = Deadline(clock, 1.0, event=lambda: True)
+    clock.advance(3.0)
+    assert deadline.remaining() == -2.0
+
+
+def test_a_sooner_deadline_hears_of_the_same_event():
+    pressed = []
+    sooner = Deadline(WorkClock(MACHINE), event=lambda: bool(pressed)).sooner(1.0)
+    assert sooner.remaining() == 1.0
+    pressed.append("bumper")
+    assert sooner.expired()
+
+
+@given(at=st.floats(0, 9), other_at=st.floats(0, 9), pressed=st.booleans(), heard=st.booleans())
+def test_the_earlier_of_two_deadlines_is_over_when_either_is(at, other_at, pressed, heard):
+    clock = WorkClock(MACHINE)
+    one = Deadline(clock, at, event=lambda: pressed)
+    other = Deadline(clock, other_at, event=(lambda: heard) if heard else None)
+    clock.advance(4.5)
+    both = one.earlier(other)
+    assert both.at == min(at, other_at)
+    assert both.expired() == (one.expired() or other.expired())
+
+
+def test_of_a_deadline_on_another_clock_only_the_event_counts():
+    one, other = Deadline(WorkClock(MACHINE), 5.0), WorkClock(MACHINE)
+    both = one.earlier(Deadline(other, 1.0, event=lambda: True))
+    assert both.at == 5.0
+    assert both.expired()

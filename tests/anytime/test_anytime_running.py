@@ -501,3 +501,50 @@ def test_the_text_of_a_result_keeps_to_its_line():
         raise RuntimeError("y" * 1000)
 
     assert max(map(len, repr(on_work_clock(long_winded, seconds=9)).splitlines())) <= 100
+
+
+# Interrupted by an event
+
+
+def test_an_event_stops_a_run_at_its_next_check():
+    clock = WorkClock(Machine("m").with_rate("climb", 1.0))
+
+    @anytime.module(quality=lambda value: value)
+    def climb():
+        for step in range(100):
+            anytime.charge(1)
+            yield step
+
+    until = Deadline(clock, event=lambda: clock.now() >= 7.5)
+    result = anytime.run(climb, deadline=until)
+    assert (result.status, result.value) == (Status.INTERRUPTED, 7)
+
+
+def test_an_event_stops_a_solver_and_what_runs_inside():
+    clock = WorkClock(Machine("m").with_rate("inner", 1.0).with_rate("outer", 0.0))
+
+    @anytime.module(quality=lambda value: value)
+    def inner():
+        step = 0
+        while not anytime.expired():
+            step += 1
+            anytime.register(step)
+
+    @anytime.module(quality=lambda value: value)
+    def outer():
+        anytime.charge(0)
+        return anytime.run(inner, deadline=Deadline(clock)).value
+
+    result = anytime.run(outer, deadline=Deadline(clock, event=lambda: clock.now() >= 6.5))
+    assert clock.now() <= 8
+    assert 1 <= result.value <= 7
+
+
+def test_an_event_that_has_come_already_means_that_nothing_is_run():
+    @anytime.module(quality=lambda value: value)
+    def never():
+        raise AssertionError("it was run")
+        yield
+
+    result = anytime.run(never, deadline=Deadline(WorkClock(Machine("m")), event=lambda: True))
+    assert (result.status, result.fault) == (Status.NO_RESULT, None)
