@@ -262,7 +262,8 @@ def _strata(pool: Sequence[tuple[str, _Sample, int]]) -> list[tuple[str, _Sample
     )
     chosen = set(range(len(pool)))
     if len(pool) > STRATA:
-        targets = np.linspace(quality.min(), quality.max(), STRATA - 1)
+        others = STRATA - int(quality[-1] < quality.max())  # the last is often the best as well
+        targets = np.linspace(quality.min(), quality.max(), others)
         chosen = {int(np.argmin(np.abs(quality - target))) for target in targets}
         chosen.add(len(pool) - 1)
     return [pool[index] for index in sorted(chosen, key=lambda index: (quality[index], index))]

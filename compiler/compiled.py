@@ -91,7 +91,8 @@ class CompiledProgram:
         """What the result is worth for a budget: its expected quality, unless it was compiled for
         another objective; 0 below the least budget."""
         plan = self._plan(seconds)
-        return plan.value if plan else self.frontier.promise(seconds)
+        worth = self.frontier.promise(seconds)
+        return self.calibration.promise(plan.value) if plan else worth
 
     def ceiling(self, seconds: float) -> float:
         """What no division of this budget promises more than: the promise itself where it is
@@ -105,8 +106,10 @@ class CompiledProgram:
     def _plan(self, seconds: float) -> Plan | None:
         """The plan of the policy for a budget, where it is worth more than the best division."""
         plan = self.policy.plan(seconds) if self.policy else None
-        better = plan is not None and plan.value > self.frontier.promise(seconds) + 1e-9
-        return plan if better else None
+        if plan is None:
+            return None
+        worth = self.calibration.promise(plan.value)
+        return plan if worth > self.frontier.promise(seconds) + 1e-9 else None
 
     def interval(self, seconds: float) -> tuple[float, float]:
         """The 95 % interval of the promise for a budget; (0, 0) below the least one."""

@@ -55,12 +55,9 @@ def compile(
             f"program {program.name!r} never has a result in its profiles; measure its modules "
             "for longer"
         )
-    policy = None
-    if adaptive:
-        policy = adapt(program, made, calibrations(program, profiles), frontier, objective)
     steps = guards_of(profiles)
     replay = None
-    if _plain(program) and objective is EXPECTED and policy is None:
+    if _plain(program) and objective is EXPECTED:
         # On the machine of the profiles, so that a faster one never promises less.
         there = made if machine is None else tables(program, measured)
         known = frontier if machine is None else divide(there)
@@ -72,6 +69,9 @@ def compile(
             replay = replay_of(program, profiles, steps, [t.first for t in made], seed)
     else:
         calibration = as_tables_say(program, profiles, frontier, objective, seed)
+    policy = None
+    if adaptive:
+        policy = adapt(program, made, calibrations(program, profiles), frontier, objective)
     names = {profile.machine for profile in profiles.values()}
     return CompiledProgram(
         program=program,

@@ -32,7 +32,7 @@ def test_script_prints_a_table_advice_and_a_result_and_writes_its_schedule(
     assert lines[0].startswith("program navigate(image, start, goal) = find_path(see(image)")
     assert lines[1].split() == ["budget", "see", "find_path", "promised", "95", "%"]
     assert len([line for line in lines if line.endswith("]")]) == 6
-    assert "navigate in 100.0 ms promises" in printed
+    assert "brings navigate in 100.0 ms from" in printed
     assert "see 2× faster" in printed
     assert "find_path 2× faster" in printed
     assert any(line.startswith(("COMPLETE after", "INTERRUPTED after")) for line in lines)
