@@ -9,7 +9,7 @@ from typing import Any
 
 from anytime.pictures import duration, sparkline
 from monitor.endings import Ending
-from monitor.states import Decision
+from monitor.states import Decision, Situation
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Frame:
     started, ended: seconds since the task was presented. standing: there was no plan to execute.
     moments: the decisions made in it, the first at its start. driven: seconds in motion.
     interrupted: the plan in execution was broken off. story: what the robot tells of it.
+    situation: at its start. made_on: seconds of sensing behind the plan in execution.
     """
 
     index: int
@@ -55,6 +56,8 @@ class Frame:
     energy: float
     interrupted: bool
     story: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    situation: Situation = Situation(0.0, 0.0, 0.0)
+    made_on: float = 0.0
 
     @property
     def decision(self) -> Decision:
