@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,7 +164,7 @@ def _forecast(missions: Sequence[Legs]) -> Forecast:
     whole = float(np.mean([_to_walk(legs)[0] / legs[0].left for legs in missions]))
     parts, ratios = [0.0], [1.0]
     bounds = np.quantile(left, np.linspace(0, 1, PARTS + 1))
-    for low, high in zip(bounds[:-1], bounds[1:], strict=True):
+    for low, high in pairwise(bounds):
         within = (left >= low) & (left <= high)
         if within.any() and left[within].mean() > parts[-1]:
             parts.append(float(left[within].mean()))

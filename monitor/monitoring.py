@@ -180,6 +180,7 @@ class _Life:
             frame_started=started,
             route=self.route,
             walked=self.walked,
+            frame=len(self.frames),
         )
         decision = self.decide(state)
         if not self.frames:

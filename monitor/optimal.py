@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from monitor.course_tables import CourseTable
-from monitor.courses import Course
 from monitor.missions import Mission
 from monitor.states import Decision, State, Why
 

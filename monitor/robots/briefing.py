@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from anytime import ProfileLibrary, WorkClock
+from anytime import ProfileLibrary, WallClock, WorkClock
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
 from anytime.faults import Schedule
@@ -18,6 +18,7 @@ from monitor.bodies import Robot
 from monitor.calibration import Steady, calibrate, courses_from, live_steadily, rhythm_from
 from monitor.choosing import Chosen, choose_policy, tuned_division
 from monitor.courses import Course
+from monitor.forking import forked
 from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
 from monitor.monitoring import Listener, Monitor
@@ -156,6 +157,24 @@ class Briefing:
     ) -> Report:
         """Live the mission once; log: a file that is written while it goes on. faults: what goes
         wrong on the way, on purpose; those of a clock need a `FaultyClock`."""
+        report = self._live(monitor, seed, clock, log, faults)
+        if faults is not None or isinstance(clock, WallClock):
+            return report  # would not be the same again
+
+        def again(frame: int, shares: Mapping[str, float], speed: float | None) -> Report:
+            other = replace(monitor, policy=forked(monitor.policy, frame, shares, speed))
+            return self.live(other, seed)
+
+        return replace(report, again=again)
+
+    def _live(
+        self,
+        monitor: Monitor,
+        seed: int,
+        clock: Clock | None,
+        log: Path | None,
+        faults: Schedule | None,
+    ) -> Report:
         robot: Robot = self.robot(clock)
         listen: Listener = _silent
         if faults is not None:
