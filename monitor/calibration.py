@@ -9,7 +9,7 @@ import numpy as np
 
 from compiler import CompiledProgram
 from monitor.bodies import Robot
-from monitor.courses import Course, course_of, legs_of, smoothed
+from monitor.courses import Course, course_of, legs_of, refined, smoothed
 from monitor.inter_frame import Contracts, Spread
 from monitor.missions import Mission, Value
 from monitor.monitoring import Monitor
@@ -102,7 +102,7 @@ def courses_from(lived: Sequence[Steady]) -> tuple[Course, ...]:
     found = [
         course_of([legs_of(report) for report in steady.reports], steady.shares) for steady in lived
     ]
-    return smoothed([course for course in found if course is not None])
+    return refined(smoothed([course for course in found if course is not None]))
 
 
 def calibrate(

@@ -48,7 +48,8 @@ class CourseTable:
     ) -> tuple[float, float]:
         """(worth, best speed) with a plan in hand that was made on a course's sensing.
 
-        thinking: seconds that the frame's calls still take. in_hand: planned length left.
+        thinking: seconds that the frame's calls still take. in_hand: planned length left; what is
+        walked beyond a plan does not depend on how much of it is left.
         """
         row = int(np.searchsorted(made_on.beyond, to_walk, side="right")) - 1
         worth, index = kernels.best_speed(
@@ -56,7 +57,7 @@ class CourseTable:
             to_walk,
             thinking,
             self.course.contract,
-            made_on.walked[row] * (in_hand / made_on.planned),
+            np.maximum(made_on.walked[row] + (in_hand - made_on.planned), 0.5 * in_hand),
             made_on.changes[row],
             made_on.stops[row],
             self.speeds,

@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 PARTS = 6  # of the way, each with its own ratio of what is walked to what the route says
 BINS, OUTCOMES = 3, 16  # of what is left; equally likely frames in each
 SHRINK = 0.7  # of the logarithms of a forecast's changes, which partly take each other back
+FAR = 1.2  # times the contract of one course that a neighbour's may have
 LEAST_EXCESS = 0.02  # of what is walked over the route
 NEAR = 8.0  # lengths; the forecast of less does not change by ratios
 
@@ -151,6 +152,38 @@ def smoothed(courses: Sequence[Course]) -> tuple[Course, ...]:
     )
 
 
+def refined(courses: Sequence[Course]) -> tuple[Course, ...]:
+    """The courses, and one half-way between each two neighbours that are far apart."""
+    found = list(courses[:1])
+    for one, other in pairwise(courses):
+        alike = one.walked.shape == other.walked.shape
+        if alike and other.contract > FAR * one.contract:
+            found.append(_between(one, other))
+        found.append(other)
+    return tuple(found)
+
+
+def _between(one: Course, other: Course) -> Course:
+    """The course half-way: of its outcomes every second is of either."""
+    mean = {
+        name: (getattr(one, name) + getattr(other, name)) / 2.0
+        for name in ("contract", "planned", "error")
+    }
+    forecast = Forecast(
+        1.0 + float(np.sqrt((one.forecast.whole - 1.0) * (other.forecast.whole - 1.0))),
+        (one.forecast.parts + other.forecast.parts) / 2.0,
+        (one.forecast.ratios + other.forecast.ratios) / 2.0,
+        (one.forecast.trust + other.forecast.trust) / 2.0,
+    )
+    outcomes = {
+        name: np.where(np.arange(OUTCOMES) % 2, getattr(one, name), getattr(other, name))
+        for name in ("walked", "changes", "stops")
+    }
+    shares = tuple((a + b) / 2.0 for a, b in zip(one.shares, other.shares, strict=True))
+    beyond = (one.beyond + other.beyond) / 2.0
+    return Course(shares, forecast=forecast, beyond=beyond, **mean, **outcomes)
+
+
 def _to_walk(legs: Legs) -> Floats:
     """Length still walked from each frame on."""
     return np.cumsum([leg.walked for leg in reversed(legs)])[::-1]
@@ -166,7 +199,7 @@ def _forecast(missions: Sequence[Legs]) -> Forecast:
     bounds = np.quantile(left, np.linspace(0, 1, PARTS + 1))
     for low, high in pairwise(bounds):
         within = (left >= low) & (left <= high)
-        if within.any() and left[within].mean() > parts[-1]:
+        if within.any():
             parts.append(float(left[within].mean()))
             ratios.append(max(1.0, float(to_walk[within].sum() / left[within].sum())))
     seen = left * np.interp(left, parts, ratios)
