@@ -1,5 +1,6 @@
 """The compiler: from a program of anytime modules to the best division of any amount of time."""
 
+from compiler.activities import Activity
 from compiler.baselines import equal_shares, maximal, minimal
 from compiler.compiled import CompiledProgram
 from compiler.compiling import compile
@@ -11,6 +12,7 @@ from compiler.processors import round_robin
 from compiler.reading import program
 
 __all__ = [
+    "Activity",
     "CompiledProgram",
     "all_of",
     "any_of",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from compiler.advising import Advice, advise
 from compiler.calibrating import Calibration
 from compiler.costs import stretched
 from compiler.division import Floats, Frontier, moments_within, output_chances
-from compiler.executing import Execution, Listener, planned, status_of, unwanted
+from compiler.executing import Execution, Listener, Memory, planned, status_of, unwanted
 from compiler.explaining import Explanation, certificate, explain
 from compiler.guarding import Steps
 from compiler.objectives import EXPECTED, Objective
@@ -33,6 +33,9 @@ from compiler.replaying import Replay
 from compiler.storing import save
 from compiler.tables import Table
 from compiler.validating import Validation, validate
+
+if TYPE_CHECKING:
+    from compiler.activities import Activity
 
 QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
 
@@ -196,6 +199,7 @@ class CompiledProgram:
         clock: Clock | None = None,
         rng: np.random.Generator | None = None,
         on_result: Listener | None = None,
+        memory: Memory | None = None,
         **inputs: Any,
     ) -> Result:
         """Run the program for a budget: each call gets its share, unspent time passes on.
@@ -203,6 +207,7 @@ class CompiledProgram:
         seconds or deadline: the budget; clock: whose time it is (real time by default). Inside
         another run it ends at the earlier deadline.
         on_result: called with (label, value, change) whenever a call registers a result.
+        memory: what modules with a `memory` keep between runs, by call; fresh without.
         inputs: by name. Below the least budget nothing is run and there is no result.
         Raises AnytimeError for missing or unknown inputs.
         """
@@ -218,12 +223,24 @@ class CompiledProgram:
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
         allocation = self.allocate(budget)
         execution = self._execution(allocation.shares, deadline, inputs, rng, on_result)
+        execution.memory = memory or {}
         plan = self._plan(budget)
         if self.policy is not None and plan is not None:
             execution.decide = partial(self.policy.share, self.program, plan)
         for _ in execution.stages():
             pass
         return self._composed(allocation, execution)
+
+    def start(
+        self, *, clock: Clock | None = None, rng: np.random.Generator | None = None
+    ) -> Activity:
+        """An activity: this program for a loop that calls it again and again.
+
+        clock: whose time it is (real time by default). rng: of everything random in the modules.
+        """
+        from compiler.activities import Activity
+
+        return Activity(self, clock, rng)
 
     def stages(
         self,

@@ -21,6 +21,7 @@ from compiler.guarding import Steps, guard
 from compiler.tables import Table
 
 Listener = Callable[[str, Any, Change], None]
+Memory = Mapping[str, dict[str, Any]]  # what modules keep between runs, by call
 Shares = Callable[[str, float, Mapping[str, Known]], float]  # call, seconds left, what is known
 
 
@@ -30,7 +31,8 @@ class Execution:
 
     planned: for each call, seconds from the start until its share ends. unwanted: calls that are
     not run. thrifty: whether the last call keeps to its share too. decide: in place of the plan,
-    the share of a call when it is about to start. parts: what has been run, by label.
+    the share of a call when it is about to start. memory: of modules between runs, by call.
+    parts: what has been run, by label.
     """
 
     program: Program
@@ -46,6 +48,7 @@ class Execution:
     on_result: Listener | None = None
     decide: Shares | None = None
     parts: dict[str, Result] = field(default_factory=dict[str, Result])
+    memory: Memory = field(default_factory=dict[str, dict[str, Any]])
 
     def __post_init__(self) -> None:
         self.started = self.deadline.clock.now()
@@ -102,6 +105,7 @@ class Execution:
             tuple(argument.value for argument in found if argument is not None),
             own,
             rng=self.rng,
+            memory=self.memory.get(call.label),
             may_step=lambda run: not self.interrupted() and may_step(run),
             observe=None if self.on_result is None else partial(self.on_result, call.label),
         )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from compiler import CompiledProgram
 from monitor.bodies import Robot
+from monitor.courses import Course, course_of, legs_of, refined, smoothed
 from monitor.inter_frame import Contracts, Spread
 from monitor.missions import Mission, Value
 from monitor.monitoring import Monitor
@@ -22,6 +23,54 @@ BINS = 3  # of foreseen time left
 PATIENCE = 3.0  # deadlines that a mission of calibration may last
 
 
+@dataclass(frozen=True)
+class Steady:
+    """Missions that were lived at one constant division.
+
+    shares: seconds of each call. routes: length of each mission's route when it began.
+    """
+
+    shares: tuple[float, ...]
+    routes: tuple[float, ...]
+    reports: tuple[Report, ...]
+
+
+def live_steadily(
+    program: CompiledProgram,
+    mission: Mission,
+    contracts: Contracts,
+    make_robot: MakeRobot,
+    *,
+    seeds: Sequence[int],
+    levels: int = 6,
+) -> tuple[Steady, ...]:
+    """Missions lived at constant sensing times, those that reached their goal.
+
+    levels: sensing times, spread over those of the contracts. Each is lived once for each seed.
+    """
+    sensing = np.unique(contracts.shares[:, 0])
+    chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
+    longest = float(contracts.shares[:, 1:].sum(axis=1).max())
+    endless = _patient(mission)
+    lived: list[Steady] = []
+    for time in chosen:
+        rest = len(program.labels) - 1
+        shares = (float(time), *[longest / max(rest, 1)] * rest)
+        division = dict(zip(program.labels, shares, strict=True))
+        policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
+        routes: list[float] = []
+        reports: list[Report] = []
+        for seed in seeds:
+            robot = make_robot()
+            route = robot.situation().to_go
+            report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
+            if report and route > 0:
+                routes.append(route)
+                reports.append(report)
+        lived.append(Steady(shares, tuple(routes), tuple(reports)))
+    return tuple(lived)
+
+
 def measure_rhythm(
     program: CompiledProgram,
     mission: Mission,
@@ -32,27 +81,28 @@ def measure_rhythm(
     levels: int = 6,
 ) -> Rhythm | None:
     """The rhythm of a mission, from missions lived at constant sensing times; None if none of
-    them reached its goal.
+    them reached its goal. seeds, levels: see `live_steadily`."""
+    return rhythm_from(
+        live_steadily(program, mission, contracts, make_robot, seeds=seeds, levels=levels)
+    )
 
-    levels: sensing times, spread over those of the contracts. Each is lived once for each seed.
-    """
-    sensing = np.unique(contracts.shares[:, 0])
-    chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
-    lived: list[Lived] = []
-    longest = float(contracts.shares[:, 1:].sum(axis=1).max())
-    endless = _patient(mission)
-    for time in chosen:
-        shares = dict(zip(program.labels, [float(time)], strict=False))
-        rest = program.labels[1:]
-        shares.update({label: longest / max(len(rest), 1) for label in rest})
-        policy = constant(shares, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
-        for seed in seeds:
-            robot = make_robot()
-            route = robot.situation().to_go
-            report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
-            if report and route > 0:
-                lived.append(_lived(float(time), route, report))
-    return rhythm_of(lived) if lived else None
+
+def rhythm_from(lived: Sequence[Steady]) -> Rhythm | None:
+    """The rhythm of missions lived at constant divisions; None if there are none."""
+    missions = [
+        _lived(steady.shares[0], route, report)
+        for steady in lived
+        for route, report in zip(steady.routes, steady.reports, strict=True)
+    ]
+    return rhythm_of(missions) if missions else None
+
+
+def courses_from(lived: Sequence[Steady]) -> tuple[Course, ...]:
+    """The courses of missions lived at constant divisions."""
+    found = [
+        course_of([legs_of(report) for report in steady.reports], steady.shares) for steady in lived
+    ]
+    return refined(smoothed([course for course in found if course is not None]))
 
 
 def calibrate(

@@ -96,6 +96,7 @@ class _Life:
         self.presented = robot.clock.now()
         self.promised = float("nan")
         self.job = 0.0
+        self.route = self.walked = 0.0
 
     def live(self) -> Ending:
         plan: Any = None
@@ -168,7 +169,19 @@ class _Life:
         """Execute the plan in hand and make the next; returns it (None if it is of no use), the
         seconds of sensing behind it, and whether the modules had a result."""
         started, energy, driven = self.time(), situation.energy, self.robot.driven()
-        state = State("frame", started, situation, standing, made_on, frame_started=started)
+        if not self.frames:
+            self.route = situation.to_go
+        state = State(
+            "frame",
+            started,
+            situation,
+            standing,
+            made_on,
+            frame_started=started,
+            route=self.route,
+            walked=self.walked,
+            frame=len(self.frames),
+        )
         decision = self.decide(state)
         if not self.frames:
             self.promised = decision.why.net if decision.why.curve else float("nan")
@@ -196,8 +209,11 @@ class _Life:
                 energy=after.energy - energy,
                 interrupted=interrupted,
                 story=self.robot.story(),
+                situation=situation,
+                made_on=made_on,
             )
         )
+        self.walked += float(self.frames[-1].story.get("length", 0.0))
         self.tell()
         if plan is not None:
             try:
@@ -300,6 +316,7 @@ class _Life:
                 advertised=advertised,
                 seen=estimate,
                 contract=moments[-1].decision,
+                walked=state.walked + state.situation.in_hand - situation.in_hand,
             )
             again = self.decide(now)
             if again.speed != moments[-1].decision.speed:

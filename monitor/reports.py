@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
+from anytime.errors import AnytimeError
 from anytime.pictures import duration, sparkline
 from monitor.endings import Ending
-from monitor.states import Decision
+from monitor.states import Decision, Situation
+
+PRESENTED = Situation(0.0, 0.0, 0.0)  # nothing used, nothing in hand
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,7 @@ class Frame:
     started, ended: seconds since the task was presented. standing: there was no plan to execute.
     moments: the decisions made in it, the first at its start. driven: seconds in motion.
     interrupted: the plan in execution was broken off. story: what the robot tells of it.
+    situation: at its start. made_on: seconds of sensing behind the plan in execution.
     """
 
     index: int
@@ -55,6 +59,8 @@ class Frame:
     energy: float
     interrupted: bool
     story: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    situation: Situation = PRESENTED
+    made_on: float = 0.0
 
     @property
     def decision(self) -> Decision:
@@ -67,6 +73,12 @@ class Frame:
         return self.ended - self.started - self.driven
 
 
+class Again(Protocol):
+    """Lives a mission again with the decision of a frame changed."""
+
+    def __call__(self, frame: int, shares: Mapping[str, float], speed: float | None) -> Report: ...
+
+
 @dataclass(frozen=True)
 class Report:
     """The outcome of a mission.
@@ -74,6 +86,7 @@ class Report:
     promised: net value computed when the task was presented, NaN without foresight.
     net: what it was really worth.
     seconds: completion or ending time; energy used; job: seconds of work at the goal.
+    again: lives the mission again with (frame, shares, speed) changed; None where nobody can.
     """
 
     mission: str
@@ -89,6 +102,26 @@ class Report:
     frames: tuple[Frame, ...]
     machine: str = ""
     fault: str = ""
+    again: Again | None = field(default=None, repr=False, compare=False)
+
+    def fork(self, frame: int, *, speed: float | None = None, **shares: float) -> Report:
+        """The mission lived again, bit for bit, with the decision of one frame changed.
+
+        speed, and seconds by call: instead of those that were decided; `report.fork(7, see=0.03)`.
+        From there on the policy goes on as it sees fit. Raises AnytimeError for a frame or a call
+        that there is not, and for a mission that cannot be lived again.
+        """
+        if self.again is None:
+            raise AnytimeError("this mission cannot be lived again; live it with a briefing")
+        if not 0 <= frame < len(self.frames):
+            raise AnytimeError(
+                f"frame is {frame}; the mission had frames 0 to {len(self.frames) - 1}"
+            )
+        decided = self.frames[frame].decision.shares
+        unknown = [label for label in shares if label not in decided]
+        if unknown:
+            raise AnytimeError(f"no call {unknown[0]!r} to fork; there are {', '.join(decided)}")
+        return self.again(frame, shares, speed)
 
     @property
     def ledger(self) -> dict[str, float]:

@@ -35,7 +35,8 @@ class State:
     time: seconds since the task was presented. standing: there is no plan to execute.
     made_on: seconds that the sensing behind the plan in hand had.
     advertised, seen: expected quality of what was just computed by its profile, and its estimate;
-    None where there is none. contract: the decision in force.
+    None where there is none. contract: the decision in force. route: length of the route when
+    the task was presented. walked: length walked since. frame: its index.
     """
 
     moment: Moment
@@ -47,6 +48,9 @@ class State:
     seen: float | None = None
     frame_started: float = 0.0
     contract: Decision | None = None
+    route: float = 0.0
+    walked: float = 0.0
+    frame: int = 0
 
 
 @dataclass(frozen=True)

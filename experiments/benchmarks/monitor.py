@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments import shipped
 from experiments.benchmarks.figures import Benchmark
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_traces import trace_figures
+from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
 from monitor.certainty import resolve
 from monitor.decision_process import DecisionProcess, Moment
 from monitor.decision_table import (
@@ -29,6 +32,9 @@ from monitor.frame_rules import (
     simulate_frames,
     tuned_constant_rule,
 )
+from monitor.robots.briefing import QUICK as BRIEF
+from monitor.robots.briefing import brief
+from monitor.robots.grid_missions import read_mission
 from sensing import trace_folder
 
 Floats = NDArray[np.float64]
@@ -37,18 +43,9 @@ TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
 LATER = {
-    "world": "policies of the product on simulated worlds: not part of this benchmark yet",
-    "promise_error": "as world",
-    "share_of_cpu": "as world",
-    "fork.same_bytes": "missions cannot be forked yet",
     "gate.found": "there is no value gate yet",
     "gate.false_alarms": "there is no value gate yet",
 }
-NOT_YET = (
-    *(f"world.gap.{policy}" for policy in ("optimal", "paper", "fixed")),
-    *(f"world.margin_fixed.{kind}" for kind in ("linear", "soft", "hard")),
-    *(f"world.margin_fixed.{kind}_low" for kind in ("linear", "soft", "hard")),
-)
 
 
 def measure(
@@ -62,8 +59,7 @@ def measure(
 ) -> Benchmark:
     """All figures; those of `traces.` if a folder is given or `$ANYTIME_TRACES` or the usual place
     has one."""
-    missing: dict[str, str] = dict.fromkeys(NOT_YET, LATER["world"])
-    missing |= {key: reason for key, reason in LATER.items() if key != "world"}
+    missing = dict(LATER)
     settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
     figures: dict[str, float | int | None] = {}
     found: dict[str, list[float]] = {}
@@ -88,6 +84,15 @@ def measure(
     process = kinds()["high", "slow", "exponential"]
     table = solve(process)
     figures |= decision_times(table, np.random.default_rng([seed, 1]))
+    size = QUICK if quick else STANDARD
+    found_in_world, world_settings = world_figures(size, seed, progress)
+    figures |= found_in_world
+    settings |= world_settings
+    progress("forks")
+    briefing = brief(read_mission(shipped.mission_path()), shipped.profiles(), BRIEF)
+    figures |= fork_figures(briefing, seed)
+    progress("a mission in real time")
+    figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()
     if folder is None:
         for key in ("traces.loss", "traces.vs_fixed", "traces.worse_than_fixed"):

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from anytime import ProfileLibrary, WorkClock
+from anytime import ProfileLibrary, WallClock, WorkClock
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
 from anytime.faults import Schedule
 from compiler import CompiledProgram, compile
 from monitor.bodies import Robot
-from monitor.calibration import calibrate, measure_rhythm
+from monitor.calibration import Steady, calibrate, courses_from, live_steadily, rhythm_from
+from monitor.choosing import Chosen, choose_policy, tuned_division
+from monitor.courses import Course
+from monitor.forking import forked
 from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
 from monitor.monitoring import Listener, Monitor
@@ -27,28 +30,32 @@ from monitor.robots.grid import GridRobot, Scene
 from monitor.robots.grid_missions import GridMission
 from monitor.robots.navigation import navigate
 
-POLICIES = ("expected", "paper", "fixed", "min", "max")
+POLICIES = ("optimal", "table", "expected", "paper", "fixed", "min", "max")
 # Missions of calibration have seeds of their own, far from those that anybody runs.
-RHYTHM_SEED, CALIBRATION_SEED = 1_000_000, 2_000_000
+RHYTHM_SEED, CALIBRATION_SEED, CHOICE_SEED = 1_000_000, 2_000_000, 2_500_000
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How many missions are lived for calibration: levels of sensing × seeds, then seeds."""
+    """How many missions are lived for calibration: levels of sensing × seeds, then seeds; and to
+    choose the policy, seeds for each."""
 
     levels: int = 6
-    rhythm_seeds: int = 8
+    rhythm_seeds: int = 12
     seeds: int = 16
+    choice_seeds: int = 20
 
 
-QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6)
+QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, choice_seeds=4)
 LONG = 400.0  # cells; calibration lives fewer missions that are longer than this
 
 
 def effort_for(scene: Scene) -> Effort:
     """The effort that a scene needs: less the longer its missions are."""
     share = min(1.0, LONG / max(scene.optimal, 1.0)) if np.isfinite(scene.optimal) else 0.0
-    return Effort(6, max(3, round(8 * share)), max(6, round(16 * share)))
+    return Effort(
+        6, max(3, round(12 * share)), max(6, round(16 * share)), max(6, round(20 * share))
+    )
 
 
 @dataclass(frozen=True)
@@ -59,11 +66,17 @@ class Briefing:
     program: CompiledProgram
     rhythm: Rhythm
     effort: Effort
+    lived: tuple[Steady, ...] = ()
 
     def robot(self, clock: Clock | None = None) -> GridRobot:
         """The robot at the start of the mission."""
         clock = clock or WorkClock(self.grid.machine)
         return GridRobot(self.grid.scene, self.grid.mission.energy, clock)
+
+    @cached_property
+    def courses(self) -> tuple[Course, ...]:
+        """What the mission's rest looks like at each constant division that was lived."""
+        return courses_from(self.lived)
 
     @cached_property
     def contracts(self) -> Contracts:
@@ -90,7 +103,37 @@ class Briefing:
             return self._calibrated(pinned_contracts(self.program, name))
         if name == "expected":
             return self._calibrated(self.contracts)
+        if name == "table":
+            return self._tables()
+        if name == "optimal":
+            return self._chosen()
         raise AnytimeError(f"no policy {name!r}; there are {', '.join(POLICIES)}")
+
+    def _tables(self) -> Policy:
+        from monitor.course_tables import solve
+        from monitor.optimal import Optimal
+
+        mission, route = self.grid.mission, self.robot().situation().to_go
+        if not self.courses or not np.isfinite(route):
+            return self._calibrated(self.contracts)
+        tables = tuple(solve(mission, course, route) for course in self.courses)
+        return Optimal(mission, self.program.labels, tables)
+
+    def _chosen(self) -> Chosen:
+        """The best of the tables, of the expectation and of a fixed division, on missions that
+        made none of them."""
+        policies = {"table": self._tables(), "expected": self._calibrated(self.contracts)}
+        fixed = tuned_division(self.program, self.grid.mission, self.lived)
+        if fixed is not None:
+            policies["fixed"] = fixed
+        return choose_policy(
+            self.program,
+            self.grid.mission,
+            policies,
+            self.rhythm,
+            self.robot,
+            seeds=range(CHOICE_SEED, CHOICE_SEED + self.effort.choice_seeds),
+        )
 
     def _calibrated(self, contracts: Contracts) -> Policy:
         seeds = range(CALIBRATION_SEED, CALIBRATION_SEED + self.effort.seeds)
@@ -114,6 +157,24 @@ class Briefing:
     ) -> Report:
         """Live the mission once; log: a file that is written while it goes on. faults: what goes
         wrong on the way, on purpose; those of a clock need a `FaultyClock`."""
+        report = self._live(monitor, seed, clock, log, faults)
+        if faults is not None or isinstance(clock, WallClock):
+            return report  # would not be the same again
+
+        def again(frame: int, shares: Mapping[str, float], speed: float | None) -> Report:
+            other = replace(monitor, policy=forked(monitor.policy, frame, shares, speed))
+            return self.live(other, seed)
+
+        return replace(report, again=again)
+
+    def _live(
+        self,
+        monitor: Monitor,
+        seed: int,
+        clock: Clock | None,
+        log: Path | None,
+        faults: Schedule | None,
+    ) -> Report:
         robot: Robot = self.robot(clock)
         listen: Listener = _silent
         if faults is not None:
@@ -151,7 +212,7 @@ def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = No
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)
     seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)
-    rhythm = measure_rhythm(
+    lived = live_steadily(
         program,
         grid.mission,
         briefing.contracts,
@@ -159,7 +220,7 @@ def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = No
         seeds=seeds,
         levels=effort.levels,
     )
-    return Briefing(grid, program, rhythm or unknown, effort)
+    return Briefing(grid, program, rhythm_from(lived) or unknown, effort, lived)
 
 
 def _silent(frame: Frame) -> None:

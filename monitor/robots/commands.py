@@ -23,7 +23,11 @@ def declare(commands: Any) -> None:
     parser.add_argument("--goal", type=_cell, metavar="ROW,COLUMN")
     parser.add_argument("--scenario", type=natural, metavar="N", help="the N-th of FILE.scen")
     parser.add_argument("--seed", type=natural, default=0, help="of the mission (default 0)")
-    parser.add_argument("--policy", default="expected", help="expected, paper, fixed, min or max")
+    parser.add_argument(
+        "--policy",
+        default="optimal",
+        help="optimal (default), paper, fixed, table, expected, min or max",
+    )
     parser.add_argument(
         "--robot", default="simulated", metavar="WHERE", help="a NAO: simulated or naoqi:tcp://…"
     )

@@ -1,0 +1,159 @@
+"""Activities: a compiled program in a loop that is not ours, a control loop or a ROS node."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from anytime.clocks import Clock
+from anytime.errors import AnytimeError
+from anytime.modules import Module
+from anytime.results import Result
+from compiler.compiled import CompiledProgram
+from compiler.division import divide
+from compiler.guarding import Steps
+
+WEIGHT = 0.2  # of the newest run in a module's running ratio
+WILDEST = 4.0  # times as long, or as short, as one run may claim that its steps take
+DRIFT = 1.1  # by which a ratio must have changed before time is divided anew
+
+
+class Activity:
+    """A program that is called again and again.
+
+    Modules keep what they put into `memory` from call to call; one with a memory registers first
+    what it already has. How long steps really take is compared with the profile, and when that
+    changes time is divided anew. Made by `CompiledProgram.start`; close it, or use it with `with`.
+    """
+
+    def __init__(
+        self,
+        program: CompiledProgram,
+        clock: Clock | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        self._measured = self._program = program
+        self._clock, self._rng = clock, rng
+        self._memory: dict[str, dict[str, Any]] = {label: {} for label in program.labels}
+        self._modules = {call.module.name: call.module for call in program.program.calls}
+        self._logs = dict.fromkeys(self._modules, 0.0)  # of the running ratios
+        self._divided = dict.fromkeys(self._modules, 1.0)  # ratios of the division in force
+        self._closed = False
+        self.calls = 0
+        self.why = "divided as compiled"
+
+    @property
+    def program(self) -> CompiledProgram:
+        """The program as it is divided now."""
+        return self._program
+
+    @property
+    def ratios(self) -> Mapping[str, float]:
+        """How long the steps of each module take now over how long they took when measured."""
+        return {name: math.exp(ratio) for name, ratio in self._logs.items()}
+
+    @property
+    def drift(self) -> Mapping[str, float]:
+        """The ratios by which time was divided anew, of the modules that have left their profile;
+        empty where all is as measured."""
+        return {name: ratio for name, ratio in self._divided.items() if not _alike(ratio, 1.0)}
+
+    def run(self, seconds: float, **inputs: Any) -> Result:
+        """Run the program once within a budget of seconds; see `CompiledProgram.run`.
+
+        Raises AnytimeError once the activity is closed.
+        """
+        if self._closed:
+            raise AnytimeError(f"the activity of {self._program.name!r} is closed; start another")
+        self.calls += 1
+        result = self._program.run(
+            seconds, clock=self._clock, rng=self._rng, memory=self._memory, **inputs
+        )
+        for call in self._program.program.calls:
+            part = result.parts.get(call.label)
+            if part is not None:
+                self._observe(call.module, part)
+        self._divide()
+        return result
+
+    def close(self) -> None:
+        """Forget what modules keep; later calls are refused."""
+        self._closed = True
+        self._memory.clear()
+
+    def _observe(self, module: Module, part: Result) -> None:
+        """Compare the durations of a run's steps with those of the profile."""
+        steps = self._measured.steps.get(module.name)
+        if steps is None or not steps.median:
+            return
+        took = np.diff([change.seconds for change in part.history], prepend=0.0)
+        usual = np.array(
+            [steps.median[min(index, len(steps.median) - 1)] for index in range(len(took))]
+        )
+        if "memory" in module.filled:  # the first result is an old one
+            took, usual = took[1:], usual[1:]
+        if not len(took) or took.sum() <= 0 or usual.sum() <= 0:
+            return
+        ratio = float(np.clip(took.sum() / usual.sum(), 1.0 / WILDEST, WILDEST))
+        old = self._logs[module.name]
+        self._logs[module.name] = old + WEIGHT * (math.log(ratio) - old)
+
+    def _divide(self) -> None:
+        """Divide time anew when a module's ratio has moved away from the division in force."""
+        ratios = self.ratios
+        moved = [name for name, ratio in ratios.items() if not _alike(ratio, self._divided[name])]
+        if not moved:
+            return
+        self._divided = {
+            name: 1.0 if _alike(ratio, 1.0) else ratio for name, ratio in ratios.items()
+        }
+        self.why = "; ".join(
+            f"{name} takes {ratios[name]:.2f} times as long as measured" for name in moved
+        )
+        self._program = _scaled(self._measured, self._divided)
+
+    def __enter__(self) -> Activity:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        state = "closed" if self._closed else self.why
+        return f"<activity of {self._program.name}, {self.calls} calls: {state}>"[:100]
+
+
+def _alike(one: float, other: float) -> bool:
+    return 1.0 / DRIFT <= one / other <= DRIFT
+
+
+def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledProgram:
+    """The program with its modules so many times as slow as measured, divided anew.
+
+    An adaptive policy was made for the times as measured, so it is left aside.
+    """
+    if all(ratio == 1.0 for ratio in ratios.values()):
+        return program
+    tables = tuple(
+        table.faster(1.0 / ratios[table.module]) if table.module in ratios else table
+        for table in program.tables
+    )
+    steps = {
+        name: Steps(
+            tuple(ratios.get(name, 1.0) * gap for gap in known.median),
+            tuple(ratios.get(name, 1.0) * gap for gap in known.p95),
+        )
+        for name, known in program.steps.items()
+    }
+    frontier = divide(tables, program.objective)
+    return replace(program, tables=tables, frontier=frontier, steps=steps, policy=None)

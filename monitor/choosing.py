@@ -1,0 +1,109 @@
+"""The policy that wins on missions that it was not made with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compiler import CompiledProgram
+from monitor.calibration import MakeRobot, Steady
+from monitor.courses import Leg, legs_of
+from monitor.missions import Mission
+from monitor.monitoring import Monitor
+from monitor.policies import Constant, Policy, constant
+from monitor.rhythms import Rhythm
+from monitor.states import Decision, State
+
+Floats = NDArray[np.float64]
+SPEEDS = 19
+DOUBT = 10.0  # missions that speak for a promise as it is
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """One of several policies, chosen by held-out missions.
+
+    policies: all of them by name; name: of the one. nets: net value of each held-out mission, by
+    policy, on the same seeds. missed: mean by which those of the chosen policy were worth more
+    than it had promised; None if it foresees nothing.
+    """
+
+    policies: Mapping[str, Policy]
+    name: str
+    nets: Mapping[str, tuple[float, ...]]
+    missed: float | None
+
+    def __call__(self, state: State) -> Decision:
+        decision = self.policies[self.name](state)
+        if state.moment != "frame":
+            return decision
+        if self.missed is None:  # what it was worth before is what it promises
+            if state.frame:
+                return decision
+            worth = float(np.mean(self.nets[self.name]))
+            curve = ((decision.contract, worth),)
+            return replace(decision, why=replace(decision.why, value=worth, curve=curve))
+        situation, why = state.situation, decision.why
+        share = (situation.to_go + situation.in_hand) / state.route if state.route > 0 else 0.0
+        more = self.missed * min(share, 1.0)
+        curve = tuple((contract, net + more) for contract, net in why.curve)
+        return replace(decision, why=replace(why, value=why.value + more, curve=curve))
+
+
+def choose_policy(
+    program: CompiledProgram,
+    mission: Mission,
+    policies: Mapping[str, Policy],
+    rhythm: Rhythm | None,
+    make_robot: MakeRobot,
+    *,
+    seeds: Sequence[int],
+) -> Chosen:
+    """The policy with the greatest mean net value on these seeds, which made none of them."""
+    lived = {
+        name: [
+            Monitor(program, policy, name, rhythm).run(mission, make_robot(), seed=seed)
+            for seed in seeds
+        ]
+        for name, policy in policies.items()
+    }
+    nets = {name: tuple(report.net for report in reports) for name, reports in lived.items()}
+    name = max(policies, key=lambda each: float(np.mean(nets[each])))
+    missed = float(np.mean([report.net - report.promised for report in lived[name]]))
+    # A few missions say little about the promise; the fewer, the less they correct it.
+    trust = len(seeds) / (len(seeds) + DOUBT)
+    return Chosen(policies, name, nets, trust * missed if np.isfinite(missed) else None)
+
+
+def tuned_division(
+    program: CompiledProgram, mission: Mission, lived: Sequence[Steady]
+) -> Constant | None:
+    """The best fixed division and speed, by missions lived at constant divisions; None without.
+
+    What was seen, and so what was walked, hardly depends on the speed: each mission tells what it
+    would have been worth at every speed.
+    """
+    speeds = np.geomspace(*mission.speeds, SPEEDS)
+    best: tuple[float, Constant] | None = None
+    for steady in lived:
+        if not steady.reports:
+            continue
+        nets = np.mean([_nets(mission, legs_of(report), speeds) for report in steady.reports], 0)
+        index = int(np.argmax(nets))
+        if best is None or nets[index] > best[0]:
+            shares = dict(zip(program.labels, steady.shares, strict=True))
+            best = float(nets[index]), constant(shares, float(speeds[index]))
+    return best[1] if best else None
+
+
+def _nets(mission: Mission, legs: Sequence[Leg], speeds: Floats) -> Floats:
+    """Net values of a mission had it been walked at each speed, [V]."""
+    walked = np.array([leg.walked for leg in legs])[:, None] / speeds
+    thinking = np.array([leg.thinking for leg in legs])[:, None]
+    seconds = np.maximum(walked, thinking).sum(axis=0) + mission.job
+    energy = walked.sum(axis=0) * mission.energy.power(speeds)
+    energy += mission.energy.idle * (seconds - walked.sum(axis=0))
+    return mission.value(seconds) - mission.energy.price * energy

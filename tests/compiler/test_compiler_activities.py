@@ -1,0 +1,113 @@
+"""Activities: memory from call to call, drift, time divided anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import anytime
+import compiler
+from anytime import AnytimeError, Machine, WorkClock
+
+MACHINE = Machine("m").with_rate("look", 0.01).with_rate("plan", 0.01)
+SLOWED = Machine("slowed").with_rate("look", 0.02).with_rate("plan", 0.01)
+
+
+@dataclass
+class Scene:
+    image: float
+
+
+@anytime.module(quality=lambda seen: seen)
+def look(image):
+    for step in range(1, 7):
+        anytime.charge(1)
+        yield image * step / 6
+
+
+@anytime.module(quality=lambda plan: plan)
+def plan(seen, *, memory):
+    best = memory.get("best", 0.0)
+    if best:
+        yield best
+    for step in range(1, 9):
+        anytime.charge(1)
+        best = max(best, seen * step / 8)
+        memory["best"] = best
+        yield best
+
+
+@compiler.program
+def steer(image):
+    return plan(look(image))
+
+
+def compiled():
+    scenes = [Scene(float(image)) for image in np.linspace(0.7, 1.0, 6)]
+    library = anytime.measure(steer, scenes, seconds=1.0, clock=lambda: WorkClock(MACHINE))
+    return compiler.compile(steer, library)
+
+
+STEER = compiled()
+
+
+def test_what_a_module_remembers_it_has_at_once_in_the_next_call():
+    with STEER.start(clock=WorkClock(MACHINE)) as activity:
+        first = activity.run(0.2, image=0.9)
+        second = activity.run(0.2, image=0.1)
+    assert first.value > 0.5
+    assert second.value >= first.value  # kept, though nothing as good is seen now
+    assert STEER.run(0.2, clock=WorkClock(MACHINE), image=0.1).value < 0.2
+
+
+def test_two_activities_share_no_memory():
+    one, other = (STEER.start(clock=WorkClock(MACHINE)) for _ in range(2))
+    assert one.run(0.2, image=1.0).value > 0.5
+    assert other.run(0.2, image=0.1).value < 0.2
+
+
+def test_as_long_as_steps_take_what_they_took_nothing_is_divided_anew():
+    activity = STEER.start(clock=WorkClock(MACHINE))
+    for _ in range(20):
+        activity.run(0.12, image=1.0)
+    assert activity.program is STEER
+    assert not activity.drift
+    assert activity.why == "divided as compiled"
+
+
+def test_a_module_that_has_become_slower_is_noticed_and_time_divided_anew():
+    activity = STEER.start(clock=WorkClock(SLOWED))
+    for _ in range(30):
+        activity.run(0.2, image=1.0)
+    assert activity.drift["look"] == pytest.approx(2.0, rel=0.1)
+    assert "plan" not in activity.drift
+    assert "look takes" in activity.why
+    assert activity.program.least > STEER.least
+    assert activity.program.promise(0.1) < STEER.promise(0.1)
+
+
+def test_a_module_that_is_itself_again_gets_its_old_share():
+    slow, usual = WorkClock(SLOWED), WorkClock(MACHINE)
+    activity = STEER.start(clock=slow)
+    for _ in range(30):
+        activity.run(0.2, image=1.0)
+    activity._clock = usual
+    for _ in range(60):
+        activity.run(0.2, image=1.0)
+    assert not activity.drift
+    assert activity.program is STEER
+
+
+def test_a_closed_activity_refuses_in_one_line():
+    activity = STEER.start(clock=WorkClock(MACHINE))
+    activity.close()
+    with pytest.raises(AnytimeError, match="activity of 'steer' is closed; start another"):
+        activity.run(0.2, image=1.0)
+
+
+def test_it_says_how_things_stand():
+    activity = STEER.start(clock=WorkClock(MACHINE))
+    activity.run(0.2, image=1.0)
+    assert repr(activity) == "<activity of steer, 1 calls: divided as compiled>"

@@ -1,0 +1,103 @@
+"""The policy that wins held-out missions; forks of missions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anytime import AnytimeError
+from experiments import shipped
+from monitor import Energy, Mission, State, Value
+from monitor.choosing import Chosen, choose_policy, tuned_division
+from monitor.logs import write_log
+from monitor.policies import constant
+from monitor.robots.briefing import QUICK, brief
+from monitor.robots.grid import Scene
+from monitor.robots.grid_missions import REFERENCE, GridMission
+from monitor.states import Situation
+from sensing.random_maps import corner_to_corner, uniform
+from sensing.vision import Vision
+
+MISSION = Mission(Value("soft", 100.0, 25.0), Energy(0.2, 0.08, 0.03), job=1.0)
+
+
+def grid() -> GridMission:
+    free = uniform(48, 0.15, np.random.default_rng(1))
+    start, goal = corner_to_corner(free)
+    scene = Scene(free, start, goal, radius=16, frame=8.0, device=Vision(2, 24))
+    return GridMission(MISSION, scene, REFERENCE)
+
+
+@pytest.fixture(scope="module")
+def briefing():
+    return brief(grid(), shipped.profiles(), QUICK)
+
+
+def log_of(report, folder):
+    return write_log(folder / "mission.jsonl", MISSION, None, report).read_bytes()
+
+
+def test_the_best_on_held_out_missions_is_chosen_and_acts(briefing):
+    shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
+    policies = {"slow": constant(shares, 1.0), "brisk": constant(shares, 5.0)}
+    chosen = choose_policy(
+        briefing.program, MISSION, policies, None, briefing.robot, seeds=range(70, 73)
+    )
+    assert chosen.name == "brisk"
+    assert np.mean(chosen.nets["brisk"]) > np.mean(chosen.nets["slow"])
+    asked = State("frame", 0.0, Situation(0.0, 40.0, 0.0), standing=True, route=40.0)
+    assert chosen(asked).speed == 5.0
+    assert chosen(asked).why.net == pytest.approx(np.mean(chosen.nets["brisk"]))
+
+
+def test_optimal_is_one_of_the_table_the_expectation_and_a_fixed_division(briefing):
+    policy = briefing.monitor("optimal").policy
+    assert isinstance(policy, Chosen)
+    assert set(policy.policies) == {"table", "expected", "fixed"}
+    best = max(float(np.mean(nets)) for nets in policy.nets.values())
+    assert np.mean(policy.nets[policy.name]) == best
+
+
+def test_a_division_is_tuned_on_missions_that_were_lived_at_another_speed(briefing):
+    tuned = tuned_division(briefing.program, MISSION, briefing.lived)
+    assert tuned is not None
+    assert 1.0 < tuned.decision.speed <= 10.0
+    assert tuned_division(briefing.program, MISSION, ()) is None
+
+
+def test_the_same_decision_forked_is_the_same_mission_byte_for_byte(briefing, tmp_path):
+    report = briefing.live(briefing.monitor("table"), 5)
+    decision = report.frames[2].decision
+    same = report.fork(2, speed=decision.speed, **decision.shares)
+    assert log_of(same, tmp_path) == log_of(report, tmp_path)
+
+
+def test_another_decision_leaves_what_came_before_it_as_it_was(briefing, tmp_path):
+    report = briefing.live(briefing.monitor("table"), 5)
+    other = report.fork(frame=2, see=0.25, speed=2.0)
+    assert other.frames[:2] == report.frames[:2]
+    assert other.frames[2].decision.shares["see"] == 0.25
+    assert other.frames[2].decision.speed == 2.0
+    assert log_of(other, tmp_path) != log_of(report, tmp_path)
+    again = other.fork(2, see=0.25, speed=2.0)
+    assert log_of(again, tmp_path) == log_of(other, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("fork", "message"),
+    [
+        ({"frame": 99, "see": 1.0}, "the mission had frames 0 to"),
+        ({"frame": 1, "hear": 1.0}, "no call 'hear' to fork; there are see, find_path"),
+        ({"frame": 1, "see": -1.0}, "it must be a finite number >= 0"),
+        ({"frame": 1, "speed": 0.0}, "it must be a finite number > 0"),
+    ],
+)
+def test_what_cannot_be_forked_is_refused_in_one_line(briefing, fork, message):
+    report = briefing.live(briefing.monitor("table"), 5)
+    with pytest.raises(AnytimeError, match=message):
+        report.fork(**fork)
+
+
+def test_a_mission_that_nobody_can_live_again_says_so(report):
+    with pytest.raises(AnytimeError, match="cannot be lived again"):
+        report.fork(0, see=1.0)
