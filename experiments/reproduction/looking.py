@@ -51,6 +51,14 @@ class _Seen:
         return seen_quality(result.value, self) if result else math.nan
 
 
+def qualities(seed: int, device: Device) -> list[float]:
+    """True quality of one look after each exposure; NaN before the first description."""
+    free = uniform(2 * RADIUS + 1, DENSITY, np.random.default_rng((seed, 5)))
+    seen = _Seen(Sensor(free, (RADIUS, RADIUS), RADIUS, device))
+    looks = device.look(free, (RADIUS, RADIUS), RADIUS, np.random.default_rng(seed))
+    return [math.nan if one is None else seen_quality(one, seen) for one in looks]
+
+
 # --- The claims, one draw each.
 
 

@@ -34,13 +34,13 @@ from sensing.vision import Vision
 SIZE = 96
 ERROR = 0.04
 """By how much the value achieved differs from the one computed when the task is presented."""
-MISSION = Mission(Value("linear", 100.0, 300.0), Energy(0.2, 0.08, 0.03), name="random floor")
-"""A value that falls over 300 s, of a way that takes some 60 s; costs as in the shipped office."""
+MISSION = Mission(Value("linear", 100.0, 100.0), Energy(0.2, 0.08, 0.03), name="random floor")
+"""A value that is gone after 100 s, for a way that takes some 25 s; costs as in the shipped office."""
 VALUES = (
     MISSION.value,
-    Value("soft", 100.0, 75.0),
-    Value("exponential", 100.0, 150.0),
-    Value("hard", 100.0, 90.0),
+    Value("soft", 100.0, 25.0),
+    Value("exponential", 100.0, 50.0),
+    Value("hard", 100.0, 35.0),
 )
 """The paper draws no task value; these are those that the page compares."""
 _DEVICE = Vision(2.0, 24.0, 0.75, 1.0)
