@@ -257,4 +257,3 @@ def noisy_lower_on_average(seed: int, way: Way) -> bool:
         for floors in (PERFECT, IMPERFECT)
     ]
     return bool(means[1] < means[0])
-

@@ -61,9 +61,7 @@ def divided(seed: int, way: Way, count: int = DOMAINS) -> Divided:
     """Measure `count` random domains that no other seed has, and compile."""
     program = cross if way is PAPER else cross_anywhere
     floors = [domain(FAMILY, SIZE, index, seed) for index in range(count)]
-    library = measure(
-        program, floors, seconds=SECONDS, clock=lambda: WorkClock(MACHINE), seed=seed
-    )
+    library = measure(program, floors, seconds=SECONDS, clock=lambda: WorkClock(MACHINE), seed=seed)
     planner = program.output.module.name
     return Divided(library, compile(program, library), planner)
 
@@ -86,7 +84,7 @@ def tree_optimal(seed: int, way: Way) -> bool:
 
 
 def compiled_above_min_max(seed: int, way: Way) -> bool:
-    """At every budget the compiled profile is at least MIN's and MAX's, and somewhere above both."""
+    """At every budget the compiled profile is at least MIN's and MAX's, somewhere above both."""
     found = divided(seed, way)
     better = np.maximum(*found.pinned())
     apart = found.promised() - better

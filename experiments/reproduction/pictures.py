@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 STYLES = ("-", "--", "-.", ":", (0, (5, 2, 1, 2)))
 """One for each colour, so that lines are told apart in grey too."""
 _DOTS = 150  # an inch, of the image
-_SALT = {"svg.hashsalt": "anytime", "font.size": 9}  # equal pictures are equal bytes
+_SALT: Any = {"svg.hashsalt": "anytime", "font.size": 9}  # equal pictures are equal bytes
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,10 @@ def save(figure: Figure, folder: Path, part: str, name: str, caption: str) -> Pi
 def curve(
     axes: Axes, place: int, x: NDArray[Any], samples: NDArray[Any], label: str, **style: Any
 ) -> None:
-    """The mean of samples, [n, X], with its 95 % interval, in the colour and style of a place."""
+    """The mean of qualities, [n, X], with its 95 % interval, in the colour and style of a place."""
     mean = samples.mean(axis=0)
     half = 1.96 * samples.std(axis=0, ddof=1) / np.sqrt(len(samples))
     colour = COLOURS[place]
     axes.plot(x, mean, linestyle=STYLES[place], color=colour, label=label, **style)
-    axes.fill_between(x, mean - half, mean + half, color=colour, alpha=0.2, linewidth=0)
+    low, high = np.clip(mean - half, 0.0, None), np.clip(mean + half, None, 1.0)
+    axes.fill_between(x, low, high, color=colour, alpha=0.2, linewidth=0)

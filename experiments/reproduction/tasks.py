@@ -16,7 +16,7 @@ from anytime import WorkClock
 from compiler import CompiledProgram, compile
 from experiments.demo import measured
 from experiments.reproduction.abstraction import FAMILY
-from experiments.reproduction.ways import PAPER, Way
+from experiments.reproduction.ways import Way
 from monitor.calibration import calibrate, measure_rhythm
 from monitor.inter_frame import compiled_contracts
 from monitor.missions import Energy, Mission, Value
@@ -35,7 +35,7 @@ SIZE = 96
 ERROR = 0.04
 """By how much the value achieved differs from the one computed when the task is presented."""
 MISSION = Mission(Value("linear", 100.0, 100.0), Energy(0.2, 0.08, 0.03), name="random floor")
-"""A value that is gone after 100 s, for a way that takes some 25 s; costs as in the shipped office."""
+"""A value that is gone after 100 s, for a way of some 20 s; costs as in the shipped office."""
 VALUES = (
     MISSION.value,
     Value("soft", 100.0, 25.0),

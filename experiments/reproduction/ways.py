@@ -31,8 +31,8 @@ class Way:
 
 
 PAPER = Way("paper", Planning.paper(), False, Vision(), paper_atp.refinements, "paper")
-"""That of [PRP16], its operators and its rule of what a collision does; and of [ZR93], its sensor, a
-plan registered at every refinement, and its argmax over certain frames."""
+"""That of [PRP16], its operators and its rule of what a collision does; and that of [ZR93], its
+sensor, a plan registered at every refinement, and its argmax over certain frames."""
 OURS = Way("ours", Planning(), True, Camera(), atp.steps, "expected")
 """All operators, a robot that falls where it touches, drift that is learnt; a camera, a planner for
 maps with walls, and a monitor that takes expectations."""

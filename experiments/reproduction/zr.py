@@ -22,10 +22,11 @@ from experiments.reproduction.dividing import (
     tree_optimal,
 )
 from experiments.reproduction.looking import vision_none_below_ta, vision_rises
+from experiments.reproduction.sweeps import sweeps
 from experiments.reproduction.tasks import ahead_behind, within_4
 from experiments.reproduction.zr_drawing import draw
 
-__all__ = ["CLAIMS", "draw", "settings"]
+__all__ = ["CLAIMS", "draw", "settings", "sweeps"]
 
 CLAIMS: tuple[Claim, ...] = (
     behaviour(

@@ -13,7 +13,6 @@ from experiments.domains import MACHINE
 from experiments.reproduction.abstraction import (
     FAMILY,
     IMPERFECT,
-    PERFECT,
     SIZE,
     Course,
     course,
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
 
 _FLOORS = 30  # of Fig. 4 to 6, and looks of Fig. 2
 _LIBRARIES = 5  # of Fig. 7 and 8, each of as many domains as a draw has
+_TITLES = ("Level 3", "Levels 1 and 0")
 _WAYS = ((PAPER, "the paper's planner"), (OURS, "ours"))
 
 
@@ -69,8 +69,8 @@ def _plans(folder: Path, seed: int) -> Picture:
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
     chosen = (0, place if place is not None else len(found.plans) - 1)
-    for axes, at, title in zip(panels, chosen, ("level 3", "levels 1 and 0"), strict=True):
-        _on_map(axes, found, at, f"Plan at {title}")
+    for axes, at, title in zip(panels, chosen, _TITLES, strict=True):
+        _on_map(axes, found, at, title)
     caption = (
         "Fig. 4, plans with perfect vision: cells of the plan (broken squares) and the way that a "
         f"robot walks that knows nothing but the plan. Of {_FLOORS} floors, the one whose level 3 "
@@ -84,8 +84,8 @@ def _noisy_plans(folder: Path, seed: int) -> Picture:
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
     chosen = (0, place if place is not None else len(found.plans) - 1)
-    for axes, at, title in zip(panels, chosen, ("level 3", "levels 1 and 0"), strict=True):
-        _on_map(axes, found, at, f"Plan at {title}, vision {IMPERFECT.vision:g}")
+    for axes, at, title in zip(panels, chosen, _TITLES, strict=True):
+        _on_map(axes, found, at, title)
     caption = (
         f"Fig. 6, plans on the same floor, seen with a quality of {IMPERFECT.vision:g}. Drawn is "
         "the true floor, on which the robot walks."
@@ -102,7 +102,7 @@ def _on_map(axes: Axes, found: Course, place: int, title: str) -> None:
     from matplotlib.patches import Rectangle
 
     plan: MultiPath = found.plans[place]
-    axes.imshow(~found.free, cmap="Greys", vmax=2.2, interpolation="nearest", origin="upper")
+    axes.imshow(~found.free, cmap="Greys", vmax=2.2, interpolation="nearest", origin="lower")
     for level, row, column in plan.plan.tolist():
         side = 1 << level
         corner = (column * side - 0.5, row * side - 0.5)
