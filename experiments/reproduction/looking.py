@@ -66,7 +66,9 @@ def vision_none_below_ta(seed: int, way: Way) -> bool:
     """Given less than Ta there is no description; given Ta there is one."""
     first, _ = span(way.device)
     short = float(np.random.default_rng((seed, 6)).uniform(0.0, 0.999)) * first
-    return not look(seed, way.device, short)[0] and bool(look(seed, way.device, first)[0])
+    # An exposure that has begun is ended; its result is late, and so none of that run-time.
+    none, some = (look(seed, way.device, seconds)[0] for seconds in (short, first))
+    return not (none and none.history[0].seconds <= short) and bool(some)
 
 
 def vision_rises(seed: int, way: Way) -> tuple[float, ...]:
