@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import platform
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +24,7 @@ BENCHMARKS = (
     "deadline",
     "faults",
 )
-PARTS = ("nao",)
+PARTS = ("zr", "nao")
 
 
 def declare(commands: Any) -> None:
@@ -59,10 +60,10 @@ def declare(commands: Any) -> None:
     parser.add_argument(
         "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
     )
-    parser.add_argument("--quick", action="store_true", help="at most 4 minutes on 2 cores")
+    parser.add_argument("--quick", action="store_true", help="at most 10 minutes on 2 cores")
     parser.add_argument("--seed", type=natural, default=0, help="of the first draw")
     parser.add_argument(
-        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the pictures"
+        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the page"
     )
     add_command(commands, "warm-up", warm_up, "compile the kernels, so that the first call is fast")
 
@@ -121,14 +122,17 @@ def bench(options: argparse.Namespace) -> Answer:
 
 
 def reproduce(options: argparse.Namespace) -> Answer:
-    """Measure what the papers claim, in their way and in ours, and draw it.
+    """Measure what the papers claim, in their way and in ours, and draw it: a table, a page
+    (`reproduce.html`), the same as a document (`results.md`), both from `results.json`.
 
     A claim that does not hold is a finding and no failure: the exit code is 0.
     """
     unknown = [part for part in options.parts if part not in PARTS]
     if unknown:
         raise AnytimeError(f"nothing named {unknown[0]!r} to reproduce; choose {', '.join(PARTS)}")
+    from experiments.reproduction.page import page
     from experiments.reproduction.reproducing import measure
+    from experiments.reproduction.results import results
 
     with progress("draws") as bar:
         found = measure(
@@ -138,7 +142,16 @@ def reproduce(options: argparse.Namespace) -> Answer:
             output=options.output,
             progress=bar,
         )
-    return Answer(repr(found), _figures(found.benchmark))
+    told = _figures(found.benchmark)
+    written = {
+        "results.json": json.dumps(told, indent=1, allow_nan=False) + "\n",
+        "results.md": results(told),
+        "reproduce.html": page(told, options.output),
+    }
+    for name, text in written.items():
+        (options.output / name).write_text(text, encoding="utf-8")
+    files = [str(options.output / name) for name in written]
+    return Answer("\n".join([repr(found), *files]), told)
 
 
 def warm_up(options: argparse.Namespace) -> Answer:

@@ -58,12 +58,35 @@ def steps(
 ) -> Iterator[Step]:
     """Plan from start to goal, abstractly at first, then in ever more detail.
 
+    As `refinements`, but a plan that is believed longer than an earlier one is not told: such a
+    step brings none, unless it is the last, whose plan is refined as far as it can be.
+    """
+    best: MultiPath | None = None
+    for step in refinements(domain, start, goal, highest_level=highest_level, grain=grain):
+        plan = step.plan
+        assert plan is not None  # every refinement brings one
+        # A base level plan's length is known, an abstract one's only believed.
+        better = best is None or plan.length < best.length or plan.level == 0 < best.level
+        best = plan if better else best
+        if step.work or better:
+            yield Step(step.work, plan if better else None)
+
+
+def refinements(
+    domain: NDArray[np.floating],
+    start: Cell,
+    goal: Cell,
+    *,
+    highest_level: int | None = None,
+    grain: int | None = None,
+) -> Iterator[Step]:
+    """Every plan that ATP registers, as Fig. 3 has it, whether it is better or not.
+
     `domain` is float32 [rows, columns], the probability that a cell is blocked. A cell that is
     blocked for certain (1.0) is impassable, a believed obstacle only dear. The first step brings a
     plan at `highest_level` (chosen by distance, at most 3, if None), later ones refine its worst
-    segment, at least `grain` expansions a step (by distance, if None). A step without a plan found
-    none better. The last one brings the plan that is refined as far as it can be. Work is counted
-    in node expansions, with 1/256 for every cell summed.
+    segment, at least `grain` expansions a step (by distance, if None; 1 is one segment a step).
+    Work is counted in node expansions, with 1/256 for every cell summed.
 
     Raises AnytimeError if start or goal is outside the domain or certainly blocked. If no way leads
     to the goal an abstract plan says nothing of it: the robot that follows it finds out. A plan
@@ -88,18 +111,13 @@ def steps(
         raise AnytimeError("the domain holds a number outside [0, 1], they must be probabilities")
     straight = _straight(start, goal)
     state, expansions = first_plan(pyramid, level, first, last, workspace(domain.size))
-    best = _multipath(state, pyramid, straight)
-    yield Step(float(expansions + streamed / _STREAMED_PER_EXPANSION), best)
+    work = float(expansions + streamed / _STREAMED_PER_EXPANSION)
+    yield Step(work, _multipath(state, pyramid, straight))
     done = False
     while not done:
         # A generator may be resumed by another thread, which has a workspace of its own.
         state, expansions, done = refine(state, pyramid, grain, workspace(domain.size))
-        plan = _multipath(state, pyramid, straight)
-        # A base level plan's length is known, an abstract one's only believed.
-        better = plan.length < best.length or (done and plan.level == 0 < best.level)
-        best = plan if better else best
-        if expansions or better:
-            yield Step(float(expansions), plan if better else None)
+        yield Step(float(expansions), _multipath(state, pyramid, straight))
 
 
 @anytime.module(estimate=lambda plan: plan.estimate, name="paper_atp")

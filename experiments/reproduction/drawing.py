@@ -15,25 +15,21 @@ from experiments.reproduction.executions import (
     obstacle_step,
     surprised,
 )
+from experiments.reproduction.pictures import Picture, new_figure, save
 from experiments.reproduction.searches import INITIAL
 from experiments.reproduction.ways import OURS, PAPER
 
 _DRAWS = 15
 
 
-def draw(folder: Path, seed: int) -> Path:
+def draw(folder: Path, seed: int) -> tuple[Picture, ...]:
     """Draw what a plan in execution is worth: with the drift of standing up unknown and learnt, and
-    when an obstacle appears, by the paper's rule and by ours. Returns the file.
+    when an obstacle appears, by the paper's rule and by ours.
 
     Of a few draws, each that which is the median in the paper's way.
     """
-    import matplotlib
-
     ahead_seed, surprised_seed = (_median(claim, seed) for claim in (_end, _step))
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, (runs, steps) = plt.subplots(1, 2, figsize=(11, 4.2), constrained_layout=True)
+    figure, (runs, steps) = new_figure(10, 3.8, columns=2)
     for way, label, style in ((PAPER, "drift unknown", "-"), (OURS, "drift learnt", "--")):
         run = ahead(ahead_seed, way)
         colour = COLOURS[0 if way is PAPER else 1]
@@ -62,11 +58,11 @@ def draw(folder: Path, seed: int) -> Path:
         axes.set(xlabel="time since it began [s]", ylabel="objective [m]")
     runs.legend(frameon=False, loc="lower right")
     steps.legend(frameon=False, loc="upper left")
-    folder.mkdir(parents=True, exist_ok=True)
-    target = folder / "reproduce-nao.png"
-    figure.savefig(target, dpi=150)
-    plt.close(figure)
-    return target
+    caption = (
+        "[PRP16] §4 and Fig. 2, the objective of a plan in execution: standing up turns the robot, "
+        f"and an obstacle appears. Of {_DRAWS} draws each, the one in the middle."
+    )
+    return (save(figure, folder, "nao", "objective", caption),)
 
 
 def _median(figure: Callable[[int], float], seed: int) -> int:

@@ -26,8 +26,9 @@ from experiments.reproduction.searches import (
     toy,
     value_unchanged_by_removal,
 )
+from experiments.reproduction.sweeps import Sweep
 
-__all__ = ["CLAIMS", "draw", "settings"]
+__all__ = ["CLAIMS", "draw", "settings", "sweeps"]
 
 CLAIMS: tuple[Claim, ...] = (
     behaviour("prp.toy", "the query finds how many normal variables, and which, add up to 5", toy),
@@ -136,3 +137,8 @@ def settings() -> dict[str, object]:
         "effort_of_executions": executions.effort(),
         "obstacle": searches.printed_disc(),
     }
+
+
+def sweeps(quick: bool) -> tuple[Sweep, ...]:
+    """None: what the paper leaves open is inferred from what it prints."""
+    return ()

@@ -11,9 +11,15 @@ from pathlib import Path
 
 from experiments.benchmarks.figures import Benchmark
 from experiments.reproduction.claims import Claim, Verdict, judge
+from experiments.reproduction.pictures import Picture
+from experiments.reproduction.sweeps import Sweep
 from experiments.reproduction.ways import OURS, PAPER, Way
 
 DRAWS, QUICK_DRAWS = 100, 30
+FIGURES = "figures"
+"""Folder of the pictures, within that of the page."""
+CUT = f"--quick: {QUICK_DRAWS} draws a claim of {DRAWS}, smaller sweeps"
+NOTHING = "what is claimed does not occur in this way"
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ class Reproduction:
 
     judged: tuple[Judged, ...]
     benchmark: Benchmark
-    pictures: tuple[Path, ...]
+    pictures: tuple[Picture, ...]
 
     def __repr__(self) -> str:
         names = [each.claim.name for each in self.judged]
@@ -51,7 +57,7 @@ class Reproduction:
             lines += _rows(each, width)
         held = sum(each.held for each in self.judged)
         lines.append(f"{held} of {len(self.judged)} claims hold in the paper's own way")
-        lines += map(str, self.pictures)
+        lines += map(str, self.benchmark.settings["cut"])  # pyright: ignore[reportArgumentType]
         return "\n".join(lines)
 
 
@@ -81,16 +87,43 @@ def measure(
         for claim in module.CLAIMS:
             papers, ours = (_verdicts(claim, way, draws) for way in (PAPER, OURS))
             judged.append(Judged(claim, papers, ours))
-    pictures = tuple(module.draw(output, seed) for module in modules.values())
+    pictures = tuple(
+        picture for module in modules.values() for picture in module.draw(output / FIGURES, seed)
+    )
+    swept = tuple(sweep for module in modules.values() for sweep in module.sweeps(quick))
+    missing: dict[str, str] = {}
+    figures = _figures(judged, missing)
     settings = {
+        "parts": list(parts),
         "draws": count,
         **{name: told for module in modules.values() for name, told in module.settings().items()},
-        "not_measured": {},
+        "cut": [CUT] if quick else [],
+        "not_measured": missing,
         "claims": {each.claim.name: each.claim.text for each in judged},
+        "sweeps": [_told(sweep) for sweep in swept],
+        "pictures": [
+            {"part": each.part, "file": f"{FIGURES}/{each.file.name}", "caption": each.caption}
+            for each in pictures
+        ],
     }
-    return Reproduction(
-        tuple(judged), Benchmark("reproduce", _figures(judged), settings, seed), pictures
-    )
+    return Reproduction(tuple(judged), Benchmark("reproduce", figures, settings, seed), pictures)
+
+
+def _told(sweep: Sweep) -> dict[str, object]:
+    """A sweep as JSON: ours, low and high in each cell."""
+    return {
+        "title": sweep.title,
+        "columns": list(sweep.columns),
+        "paper": list(sweep.paper),
+        "rows": {
+            name: [[_known(x) for x in (each.ours, each.low, each.high)] for each in cells]
+            for name, cells in sweep.rows.items()
+        },
+    }
+
+
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def _draw(task: tuple[tuple[str, ...], int]) -> Mapping[tuple[str, str], tuple[float, ...]]:
@@ -113,7 +146,8 @@ def _verdicts(
     return tuple(judge(*pair) for pair in zip(claim.values, columns, strict=True))
 
 
-def _figures(judged: Sequence[Judged]) -> dict[str, float | int | None]:
+def _figures(judged: Sequence[Judged], missing: dict[str, str]) -> dict[str, float | int | None]:
+    """By key; why one is null goes to `missing`."""
     figures: dict[str, float | int | None] = {
         "claims.total": len(judged),
         "claims.held": sum(each.held for each in judged),
@@ -122,7 +156,7 @@ def _figures(judged: Sequence[Judged]) -> dict[str, float | int | None]:
         rows = zip(each.claim.values, each.papers, each.ours, strict=True)
         for value, papers, ours in rows:
             key = ".".join(part for part in ("claim", each.claim.name, value.name) if part)
-            figures |= {
+            told = {
                 f"{key}.paper": value.paper,
                 f"{key}.ours": papers.ours,
                 f"{key}.low": papers.low,
@@ -131,6 +165,8 @@ def _figures(judged: Sequence[Judged]) -> dict[str, float | int | None]:
                 f"{key}.ours_best": ours.ours,
                 f"{key}.held_by_ours": ours.held if value.name else each.held_by_ours,
             }
+            missing |= {name: NOTHING for name, it in told.items() if math.isnan(it)}
+            figures |= {name: _known(it) for name, it in told.items()}
     return figures
 
 

@@ -135,9 +135,13 @@ def test_the_command_prints_one_object_and_draws_its_picture(capsys, tmp_path, m
     toy = told["figures"]["claim"]["prp"]["toy"]
     assert {"paper", "ours", "low", "high", "held", "ours_best"} <= set(toy)
     assert told["settings"]["claims"]["prp.toy"]
-    assert (tmp_path / "reproduce-nao.png").read_bytes().startswith(b"\x89PNG")
+    picture = tmp_path / "figures" / "nao-objective.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert json.loads((tmp_path / "results.json").read_text()) == told
+    assert "prp" in (tmp_path / "results.md").read_text().lower()
+    assert "<svg" in (tmp_path / "reproduce.html").read_text()
 
 
 def test_what_is_not_there_cannot_be_reproduced(capsys):
     assert main(["reproduce", "moon"]) == 2
-    assert "choose nao" in capsys.readouterr().err
+    assert "choose zr, nao" in capsys.readouterr().err

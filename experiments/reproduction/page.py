@@ -1,0 +1,99 @@
+"""The page of a reproduction: one file that needs no other, from its JSON and its pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from experiments.reproduction.rows import COMMANDS, PAPERS, PART, cell, rows_of, shown, summary
+
+_STYLE = """
+:root { color-scheme: light; }
+body { margin: 0 auto; max-width: 76rem; padding: 1rem; font: 1rem/1.5 system-ui, sans-serif; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .9rem; }
+th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid #ddd; }
+th:first-child, td:first-child, td.text { text-align: left; }
+td { white-space: nowrap; }
+td.text { white-space: normal; min-width: 14rem; }
+td.holds { color: #006644; } td.no, td.only { color: #a33d00; font-weight: 600; }
+figure { margin: 1.5rem 0; } figure svg { max-width: 100%; height: auto; }
+figcaption { font-size: .9rem; color: #444; max-width: 50rem; }
+pre { background: #f4f4f4; padding: .5rem .8rem; overflow-x: auto; }
+"""
+
+
+def page(told: Mapping[str, Any], folder: Path) -> str:
+    """The page as HTML. told: what `anytime reproduce --json` prints; folder: where its pictures
+    lie, which become part of the page."""
+    settings = told["settings"]
+    machine = f"Python {told['machine']['python']}, {told['machine']['system']}"
+    parts = [
+        '<!doctype html><html lang="en"><meta charset="utf-8">',
+        '<meta name="viewport" content="width=device-width, initial-scale=1">',
+        f"<title>Both papers' claims beside ours</title><style>{_STYLE}</style>",
+        f"<h1>Both papers' claims beside ours</h1><p>{escape(summary(told))} {escape(machine)}.",
+        *(escape(cut) for cut in settings["cut"]),
+        "<p>A figure of the paper's own way is judged; ours stands beside it. Of a behaviour it is "
+        "the share of the draws that show it, and 95 % must; of a mean, the 95 % interval must "
+        "contain what is printed or be better; of a single drawing, what is printed must lie "
+        "between our 5th and 95th percentile, or our median be better.",
+    ]
+    for paper, (short, full) in PAPERS.items():
+        rows = rows_of(told, paper)
+        if not rows:
+            continue
+        parts.append(f"<h2>{escape(short)}</h2><p>{escape(full)}")
+        parts.append(f"<pre>{_command(paper, told)}</pre>")
+        parts.append(_claims(rows))
+        for picture in settings["pictures"]:
+            if PART[picture["part"]] == paper:
+                parts.append(_figure(folder / picture["file"], picture["caption"]))
+        if paper == "zr":
+            parts += [_sweep(sweep) for sweep in settings["sweeps"]]
+    return "\n".join(parts) + "\n"
+
+
+def _command(paper: str, told: Mapping[str, Any]) -> str:
+    quick = " --quick" if told["settings"]["cut"] else ""
+    return escape(f"{COMMANDS[paper]} --seed {told['seed']}{quick}")
+
+
+def _claims(rows: Sequence[Any]) -> str:
+    head = ("claim", "the paper's words", "paper", "its way", "low to high", "ours", "")
+    body = [
+        f'<tr><td>{escape(r.name)}<td class="text">{escape(r.text)}<td>{r.paper}<td>{r.ours}'
+        f'<td>{r.bounds}<td>{r.best}<td class="{r.sign.split()[0]}">{r.sign}'
+        for r in rows
+    ]
+    return _table(head, body)
+
+
+def _sweep(sweep: Mapping[str, Any]) -> str:
+    printed = "<tr><td>printed" + "".join(f"<td>{shown(value)}" for value in sweep["paper"])
+    body = [
+        f"<tr><td>{escape(name)}" + "".join(f"<td>{cell(found)}" for found in row)
+        for name, row in sweep["rows"].items()
+    ]
+    return f"<h3>{escape(sweep['title'])}</h3>" + _table(("", *sweep["columns"]), [printed, *body])
+
+
+def _table(head: Sequence[str], body: Sequence[str]) -> str:
+    titles = "".join(f"<th>{escape(title)}" for title in head)
+    return f'<div class="wide"><table><tr>{titles}{"".join(body)}</table></div>'
+
+
+def _figure(file: Path, caption: str) -> str:
+    """A picture with its caption; its names are made its own, as all share one page."""
+    svg = file.read_text(encoding="utf-8")
+    svg = svg[svg.index("<svg") :]
+    own = file.stem
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="{own}-\1"', svg)
+    svg = re.sub(r"url\(#([^)]+)\)", rf"url(#{own}-\1)", svg)
+    svg = re.sub(r'href="#([^"]+)"', rf'href="#{own}-\1"', svg)
+    label = f'<svg role="img" aria-label="{escape(caption)}"'
+    svg = svg.replace("<svg", label, 1)
+    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
