@@ -10,10 +10,10 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NoReturn
 
+from anytime import plugins
 from anytime.errors import AnytimeError
 
 Progress = Callable[[int, int], None]
@@ -104,13 +104,13 @@ def resolve(reference: str) -> Any:
     if ".py:" in reference:
         file, _, name = reference.rpartition(":")
         return _from_file(Path(file), name)
-    registered = {point.name: point for point in entry_points(group="anytime.modules")}
-    if reference not in registered:
+    known = plugins.registered("anytime.modules")
+    if reference not in known:
         raise AnytimeError(
-            f"{reference!r} is not registered (known: {', '.join(sorted(registered)) or 'none'}); "
+            f"{reference!r} is not registered (known: {', '.join(known) or 'none'}); "
             "give one of these or FILE.py:NAME"
         )
-    return registered[reference].load()
+    return plugins.load(known[reference])
 
 
 def _from_file(file: Path, name: str) -> Any:

@@ -97,10 +97,10 @@ def library(options: argparse.Namespace) -> Answer:
 
 def plot(options: argparse.Namespace) -> Answer:
     """Draw each file, or each file of a folder, as a PNG here or in a folder of your choice."""
-    from importlib.metadata import entry_points
+    from anytime import plugins
 
     drawn: list[str] = []
-    drawers = {point.name: point for point in entry_points(group="anytime.drawings")}
+    drawers = plugins.registered("anytime.drawings")
     known = ", ".join(f".{name}" for name in sorted(drawers))
     files: list[Path] = []
     for place in options.file:
@@ -117,6 +117,6 @@ def plot(options: argparse.Namespace) -> Answer:
             what = f".{kind}" if kind else "a file without a suffix"
             raise AnytimeError(f"{file}: cannot draw {what}; drawn are {known}")
         target = options.output / f"{file.name}.png"
-        drawers[kind].load()(file, target)
+        plugins.load(drawers[kind])(file, target)
         drawn.append(str(target))
     return Answer("\n".join(drawn), {"files": drawn})

@@ -265,6 +265,7 @@ def is_measurable(
 
 
 CHECKS: tuple[Check, ...] = (
+    is_interruptible,
     is_measurable,
     registers_early,
     registers_often,
@@ -272,9 +273,8 @@ CHECKS: tuple[Check, ...] = (
     is_monotone,
     is_deterministic,
     leaves_values_alone,
-    is_interruptible,
 )
-"""All checks, the simplest first."""
+"""All checks. The first runs in a worker process: what cannot be ended would hold up the others."""
 
 
 @dataclass
