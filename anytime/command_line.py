@@ -8,6 +8,7 @@ import importlib.util
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -159,3 +160,18 @@ def progress(task: str) -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         bar = bars.add_task(task, total=None)
         yield lambda done, total: bars.update(bar, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def told() -> Iterator[list[str]]:
+    """Warnings of the library as lines for people; yields those told so far."""
+    lines: list[str] = []
+
+    def tell(message: Warning | str, *_: Any) -> None:
+        lines.append(str(message))
+        print(f"anytime: {message}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = tell
+        yield lines

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from anytime.command_line import Answer, add_command, folder, natural, positive, progress, resolve
+from anytime.command_line import (
+    Answer,
+    add_command,
+    folder,
+    natural,
+    positive,
+    progress,
+    resolve,
+    told,
+)
 from anytime.errors import AnytimeError
 
 
@@ -21,6 +30,15 @@ def declare(commands: Any) -> None:
     parser.add_argument("--seconds", type=positive, default=1.0, help="of each run (default 1)")
     parser.add_argument("--problems", metavar="FILE.py:NAME", help="a function (rng) -> problems")
     parser.add_argument("--seed", type=natural, default=0, help="of the problems and the runs")
+    parser.add_argument(
+        "--executor",
+        default="serial",
+        metavar="WHERE",
+        help="serial, processes:N, dask://HOST:PORT",
+    )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the runs that the library has kept"
+    )
     parser = add_command(commands, "library", library, "show the profiles of a library")
     parser.add_argument("action", nargs="?", choices=["check"], help="only check the files")
     _add_library(parser)
@@ -40,7 +58,11 @@ def _add_library(parser: argparse.ArgumentParser) -> None:
 
 
 def profile(options: argparse.Namespace) -> Answer:
-    """Measure modules or programs and add their profiles to a library."""
+    """Measure modules or programs and add their profiles to a library.
+
+    The runs are kept beside them, NAME.runs, as they come; `--resume` goes on where they end. A
+    problem that fails is left out and told, and the exit code is then 1.
+    """
     import itertools
 
     import numpy as np
@@ -52,6 +74,7 @@ def profile(options: argparse.Namespace) -> Answer:
         raise AnytimeError(f"--runs {options.runs}: at least one problem is needed")
     kept: Path = options.library
     filled = ProfileLibrary(kept) if kept.is_dir() else ProfileLibrary()
+    left_out = 0
     for reference in options.module:
         what = resolve(reference)
         if not isinstance(what, Module | Program):
@@ -65,15 +88,24 @@ def profile(options: argparse.Namespace) -> Answer:
             raise AnytimeError(
                 f"{name}: {error}; give a function (rng) that returns or yields problems"
             ) from error
-        with progress(f"measuring {what.name}") as report:
+        store = kept / f"{what.name}.runs"
+        if not options.resume:
+            store.unlink(missing_ok=True)
+        with told() as warned, progress(f"measuring {what.name}") as report:
             measured = measure(
-                what, problems, seconds=options.seconds, seed=options.seed, progress=report
+                what,
+                problems,
+                seconds=options.seconds,
+                seed=options.seed,
+                executor=options.executor,
+                store=store,
+                progress=report,
             )
+        left_out += sum("is left out" in line for line in warned)
         filled = filled.updated(measured)
     filled.save(kept)
-    return Answer(
-        repr(filled), {"library": str(kept), "modules": list(filled), "problems": options.runs}
-    )
+    data = {"library": str(kept), "modules": list(filled), "problems": options.runs}
+    return Answer(repr(filled), {**data, "left_out": left_out}, int(left_out > 0))
 
 
 def _problems(what: Any) -> Any:

@@ -334,9 +334,7 @@ def _pickled(value: Any) -> bytes | None:
 
 
 def _same(one: Any, other: Any) -> bool:
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return bool(np.array_equal(one, other, equal_nan=False)) or _pickled(one) == _pickled(other)
     try:
         return bool(one == other) or _pickled(one) == _pickled(other)
-    except ValueError:  # arrays inside
+    except ValueError:  # arrays
         return _pickled(one) == _pickled(other)
