@@ -30,7 +30,7 @@ def maker(specification: str) -> Make | None:
 
 def lent(executor: Executor) -> Make:
     """An executor of the user's own: it is not shut down, and cannot be made anew."""
-    left = [_Lent(executor)]
+    left = [_Guest(executor, lambda: None)]
 
     def make() -> Executor:
         if not left:
@@ -43,15 +43,17 @@ def lent(executor: Executor) -> Make:
     return make
 
 
-class _Lent(Executor):
-    def __init__(self, executor: Executor) -> None:
-        self._executor = executor
+class _Guest(Executor):
+    """Passes on what is submitted; what closes it is not the executor's own shutdown."""
+
+    def __init__(self, executor: Executor, close: Callable[[], object]) -> None:
+        self._executor, self._close = executor, close
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
         return self._executor.submit(fn, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """The user does it."""
+        self._close()
 
 
 def _processes(count: int) -> Executor:
@@ -69,11 +71,11 @@ def _dask(address: str) -> Executor:
             "Dask is not installed; pip install 'anytime-robots[dask]', or use processes:N"
         ) from None
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=10, set_as_default=False)
     except (OSError, TimeoutError) as error:
         raise AnytimeError(
             f"no Dask scheduler at {address} ({type(error).__name__}); start one with: dask "
             "scheduler --host 127.0.0.1"
         ) from None
-    # Equal calls would be taken for one; a worker that dies costs a try.
-    return client.get_executor(pure=False, retries=2)
+    # Equal calls would be taken for one if they were pure.
+    return _Guest(client.get_executor(pure=False, retries=2), client.close)
