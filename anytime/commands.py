@@ -1,4 +1,4 @@
-"""Commands of the library: profile, library, plot."""
+"""Commands of the library: profile, library, calibrate, doctor, plot."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from anytime.command_line import (
     told,
 )
 from anytime.errors import AnytimeError
+
+CALIBRATION = 100  # problems among which known ones are sought
 
 
 def declare(commands: Any) -> None:
@@ -42,6 +44,23 @@ def declare(commands: Any) -> None:
     parser = add_command(commands, "library", library, "show the profiles of a library")
     parser.add_argument("action", nargs="?", choices=["check"], help="only check the files")
     _add_library(parser)
+    parser = add_command(
+        commands, "calibrate", calibrate, "move a library to this machine, by a few runs"
+    )
+    parser.add_argument("module", help="a registered name or FILE.py:NAME")
+    _add_library(parser)
+    parser.add_argument("--problems", metavar="FILE.py:NAME", help="as `profile` had them")
+    parser.add_argument("--seed", type=natural, default=0, help="as `profile` had it")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=folder,
+        default=Path("calibrated"),
+        metavar="DIR",
+        help="for the library on this machine (default: calibrated)",
+    )
+    parser = add_command(commands, "doctor", doctor, "speed and noise of this machine")
+    parser.add_argument("--seconds", type=positive, default=2.0, help="to look (default 2)")
     parser = add_command(commands, "plot", plot, "draw profiles, compiled programs and logs")
     parser.add_argument(
         "file", nargs="+", type=Path, help=".profile, .schedule, .jsonl, or a folder of them"
@@ -106,6 +125,51 @@ def profile(options: argparse.Namespace) -> Answer:
     filled.save(kept)
     data = {"library": str(kept), "modules": list(filled), "problems": options.runs}
     return Answer(repr(filled), {**data, "left_out": left_out}, int(left_out > 0))
+
+
+def calibrate(options: argparse.Namespace) -> Answer:
+    """Run a few of a library's problems again, and write the library as it is on this machine.
+
+    The exit code is 1 when a module has changed, which no machine explains.
+    """
+    import itertools
+
+    import numpy as np
+
+    from anytime import Module, ProfileLibrary
+    from anytime.calibrating import calibrate
+    from anytime.programs import Program
+
+    what = resolve(options.module)
+    if not isinstance(what, Module | Program):
+        raise AnytimeError(f"{options.module} is {type(what).__name__}, not a module or program")
+    source = resolve(options.problems) if options.problems else _problems(what)
+    made = source(np.random.default_rng(options.seed))
+    problems = list(itertools.islice(made, CALIBRATION))
+    found = calibrate(ProfileLibrary(options.library), what, problems, seed=options.seed)
+    found.library.save(options.output)
+    data = {
+        each.module: {
+            "ratio": each.ratio,
+            "ratio_low": each.low,
+            "ratio_high": each.high,
+            "problems": len(each.ratios),
+            "changed": each.changed,
+        }
+        for each in found.modules
+    }
+    changed = any(each.changed for each in found.modules)
+    return Answer(f"{found!r}\n{options.output}", data, int(changed))
+
+
+def doctor(options: argparse.Namespace) -> Answer:
+    """Measure speed and noise of this machine, and load what other packages have registered."""
+    from dataclasses import asdict
+
+    from anytime.examining import examine
+
+    found = examine(options.seconds)
+    return Answer(repr(found), {**asdict(found), "quiet": found.quiet})
 
 
 def _problems(what: Any) -> Any:

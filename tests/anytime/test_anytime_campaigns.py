@@ -88,6 +88,15 @@ def test_two_processes_give_the_same_bytes_though_one_is_killed(tmp_path, serial
     assert not Path(trap).exists()
 
 
+def test_a_dask_cluster_gives_the_same_bytes_though_a_worker_is_killed(tmp_path, serial, trap):
+    pytest.importorskip("distributed")
+    from experiments.benchmarks.clusters import cluster
+
+    with cluster(2) as address:
+        assert measured(tmp_path / "library", trap, executor=address) == serial
+    assert not Path(trap).exists()
+
+
 def test_a_killed_campaign_is_resumed_to_the_same_bytes(tmp_path, serial):
     store = tmp_path / "climb.runs"
     measured(tmp_path / "a", executor="serial", store=store)
