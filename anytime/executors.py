@@ -65,13 +65,13 @@ def _processes(count: int) -> Executor:
 
 def _dask(address: str) -> Executor:
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise AnytimeError(
             "Dask is not installed; pip install 'anytime-robots[dask]', or use processes:N"
         ) from None
     try:
-        client = Client(address, timeout=10, set_as_default=False)
+        client: Any = distributed.Client(address, timeout=10, set_as_default=False)  # untyped
     except (OSError, TimeoutError) as error:
         raise AnytimeError(
             f"no Dask scheduler at {address} ({type(error).__name__}); start one with: dask "

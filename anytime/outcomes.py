@@ -35,9 +35,11 @@ class Outcome:
     """
 
     problem: str
-    recordings: Mapping[str, tuple[Recording, ...]] = field(default_factory=dict)
-    references: Mapping[str, float] = field(default_factory=dict)
-    paces: Mapping[str, tuple[Pace, ...]] = field(default_factory=dict)
+    recordings: Mapping[str, tuple[Recording, ...]] = field(
+        default_factory=dict[str, tuple[Recording, ...]]
+    )
+    references: Mapping[str, float] = field(default_factory=dict[str, float])
+    paces: Mapping[str, tuple[Pace, ...]] = field(default_factory=dict[str, tuple[Pace, ...]])
     failed: str | None = None
 
 

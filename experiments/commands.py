@@ -22,6 +22,7 @@ BENCHMARKS = (
     "monitor",
     "deadline",
     "faults",
+    "campaign",
 )
 PARTS = ("nao",)
 
