@@ -7,8 +7,8 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Sequence
-from importlib.metadata import entry_points
 
+from anytime import plugins
 from anytime.command_line import Parser, as_json
 from anytime.errors import AnytimeError
 
@@ -21,11 +21,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = Parser(prog="anytime", description="Anytime computation for robots.")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for point in sorted(entry_points(group="anytime.commands"), key=lambda point: point.name):
+    for point in plugins.registered("anytime.commands").values():
         try:
-            point.load().declare(commands)
+            plugins.load(point).declare(commands)
         except Exception as error:  # a third party's broken command must not break ours
-            print(f"anytime: commands of {point.name!r} are left out: {error}", file=sys.stderr)
+            told = f"commands of {plugins.origin(point)} are left out: {error}"
+            print(f"anytime: {told}".replace("\n", " "), file=sys.stderr)
     options = parser.parse_args(arguments)
     try:
         answer = options.run(options)

@@ -8,12 +8,13 @@ import importlib.util
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, NoReturn
 
+from anytime import plugins
 from anytime.errors import AnytimeError
 
 Progress = Callable[[int, int], None]
@@ -104,13 +105,13 @@ def resolve(reference: str) -> Any:
     if ".py:" in reference:
         file, _, name = reference.rpartition(":")
         return _from_file(Path(file), name)
-    registered = {point.name: point for point in entry_points(group="anytime.modules")}
-    if reference not in registered:
+    known = plugins.registered("anytime.modules")
+    if reference not in known:
         raise AnytimeError(
-            f"{reference!r} is not registered (known: {', '.join(sorted(registered)) or 'none'}); "
+            f"{reference!r} is not registered (known: {', '.join(known) or 'none'}); "
             "give one of these or FILE.py:NAME"
         )
-    return registered[reference].load()
+    return plugins.load(known[reference])
 
 
 def _from_file(file: Path, name: str) -> Any:
@@ -159,3 +160,18 @@ def progress(task: str) -> Iterator[Progress]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         bar = bars.add_task(task, total=None)
         yield lambda done, total: bars.update(bar, completed=done, total=total)
+
+
+@contextlib.contextmanager
+def told() -> Iterator[list[str]]:
+    """Warnings of the library as lines for people; yields those told so far."""
+    lines: list[str] = []
+
+    def tell(message: Warning | str, *_: Any) -> None:
+        lines.append(str(message))
+        print(f"anytime: {message}", file=sys.stderr)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = tell
+        yield lines

@@ -1,4 +1,4 @@
-"""Commands of the library: profile, library, plot."""
+"""Commands of the library: profile, library, calibrate, doctor, plot."""
 
 from __future__ import annotations
 
@@ -6,8 +6,19 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from anytime.command_line import Answer, add_command, folder, natural, positive, progress, resolve
+from anytime.command_line import (
+    Answer,
+    add_command,
+    folder,
+    natural,
+    positive,
+    progress,
+    resolve,
+    told,
+)
 from anytime.errors import AnytimeError
+
+CALIBRATION = 100  # problems among which known ones are sought
 
 
 def declare(commands: Any) -> None:
@@ -21,9 +32,35 @@ def declare(commands: Any) -> None:
     parser.add_argument("--seconds", type=positive, default=1.0, help="of each run (default 1)")
     parser.add_argument("--problems", metavar="FILE.py:NAME", help="a function (rng) -> problems")
     parser.add_argument("--seed", type=natural, default=0, help="of the problems and the runs")
+    parser.add_argument(
+        "--executor",
+        default="serial",
+        metavar="WHERE",
+        help="serial, processes:N, dask://HOST:PORT",
+    )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the runs that the library has kept"
+    )
     parser = add_command(commands, "library", library, "show the profiles of a library")
     parser.add_argument("action", nargs="?", choices=["check"], help="only check the files")
     _add_library(parser)
+    parser = add_command(
+        commands, "calibrate", calibrate, "move a library to this machine, by a few runs"
+    )
+    parser.add_argument("module", help="a registered name or FILE.py:NAME")
+    _add_library(parser)
+    parser.add_argument("--problems", metavar="FILE.py:NAME", help="as `profile` had them")
+    parser.add_argument("--seed", type=natural, default=0, help="as `profile` had it")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=folder,
+        default=Path("calibrated"),
+        metavar="DIR",
+        help="for the library on this machine (default: calibrated)",
+    )
+    parser = add_command(commands, "doctor", doctor, "speed and noise of this machine")
+    parser.add_argument("--seconds", type=positive, default=2.0, help="to look (default 2)")
     parser = add_command(commands, "plot", plot, "draw profiles, compiled programs and logs")
     parser.add_argument(
         "file", nargs="+", type=Path, help=".profile, .schedule, .jsonl, or a folder of them"
@@ -40,7 +77,11 @@ def _add_library(parser: argparse.ArgumentParser) -> None:
 
 
 def profile(options: argparse.Namespace) -> Answer:
-    """Measure modules or programs and add their profiles to a library."""
+    """Measure modules or programs and add their profiles to a library.
+
+    The runs are kept beside them, NAME.runs, as they come; `--resume` goes on where they end. A
+    problem that fails is left out and told, and the exit code is then 1.
+    """
     import itertools
 
     import numpy as np
@@ -52,6 +93,7 @@ def profile(options: argparse.Namespace) -> Answer:
         raise AnytimeError(f"--runs {options.runs}: at least one problem is needed")
     kept: Path = options.library
     filled = ProfileLibrary(kept) if kept.is_dir() else ProfileLibrary()
+    left_out = 0
     for reference in options.module:
         what = resolve(reference)
         if not isinstance(what, Module | Program):
@@ -65,15 +107,69 @@ def profile(options: argparse.Namespace) -> Answer:
             raise AnytimeError(
                 f"{name}: {error}; give a function (rng) that returns or yields problems"
             ) from error
-        with progress(f"measuring {what.name}") as report:
+        store = kept / f"{what.name}.runs"
+        if not options.resume:
+            store.unlink(missing_ok=True)
+        with told() as warned, progress(f"measuring {what.name}") as report:
             measured = measure(
-                what, problems, seconds=options.seconds, seed=options.seed, progress=report
+                what,
+                problems,
+                seconds=options.seconds,
+                seed=options.seed,
+                executor=options.executor,
+                store=store,
+                progress=report,
             )
+        left_out += sum("is left out" in line for line in warned)
         filled = filled.updated(measured)
     filled.save(kept)
-    return Answer(
-        repr(filled), {"library": str(kept), "modules": list(filled), "problems": options.runs}
-    )
+    data = {"library": str(kept), "modules": list(filled), "problems": options.runs}
+    return Answer(repr(filled), {**data, "left_out": left_out}, int(left_out > 0))
+
+
+def calibrate(options: argparse.Namespace) -> Answer:
+    """Run a few of a library's problems again, and write the library as it is on this machine.
+
+    The exit code is 1 when a module has changed, which no machine explains.
+    """
+    import itertools
+
+    import numpy as np
+
+    from anytime import Module, ProfileLibrary
+    from anytime.calibrating import calibrate
+    from anytime.programs import Program
+
+    what = resolve(options.module)
+    if not isinstance(what, Module | Program):
+        raise AnytimeError(f"{options.module} is {type(what).__name__}, not a module or program")
+    source = resolve(options.problems) if options.problems else _problems(what)
+    made = source(np.random.default_rng(options.seed))
+    problems = list(itertools.islice(made, CALIBRATION))
+    found = calibrate(ProfileLibrary(options.library), what, problems, seed=options.seed)
+    found.library.save(options.output)
+    data = {
+        each.module: {
+            "ratio": each.ratio,
+            "ratio_low": each.low,
+            "ratio_high": each.high,
+            "problems": len(each.ratios),
+            "changed": each.changed,
+        }
+        for each in found.modules
+    }
+    changed = any(each.changed for each in found.modules)
+    return Answer(f"{found!r}\n{options.output}", data, int(changed))
+
+
+def doctor(options: argparse.Namespace) -> Answer:
+    """Measure speed and noise of this machine, and load what other packages have registered."""
+    from dataclasses import asdict
+
+    from anytime.examining import examine
+
+    found = examine(options.seconds)
+    return Answer(repr(found), {**asdict(found), "quiet": found.quiet})
 
 
 def _problems(what: Any) -> Any:
@@ -97,10 +193,10 @@ def library(options: argparse.Namespace) -> Answer:
 
 def plot(options: argparse.Namespace) -> Answer:
     """Draw each file, or each file of a folder, as a PNG here or in a folder of your choice."""
-    from importlib.metadata import entry_points
+    from anytime import plugins
 
     drawn: list[str] = []
-    drawers = {point.name: point for point in entry_points(group="anytime.drawings")}
+    drawers = plugins.registered("anytime.drawings")
     known = ", ".join(f".{name}" for name in sorted(drawers))
     files: list[Path] = []
     for place in options.file:
@@ -117,6 +213,6 @@ def plot(options: argparse.Namespace) -> Answer:
             what = f".{kind}" if kind else "a file without a suffix"
             raise AnytimeError(f"{file}: cannot draw {what}; drawn are {known}")
         target = options.output / f"{file.name}.png"
-        drawers[kind].load()(file, target)
+        plugins.load(drawers[kind])(file, target)
         drawn.append(str(target))
     return Answer("\n".join(drawn), {"files": drawn})

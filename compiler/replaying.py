@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anytime.measuring import CHANGES
 from anytime.profiles import Profile, Recording
 from anytime.programs import Program, upstream
+from anytime.sampling import CHANGES
 from anytime.strata import stratum_weights
 from compiler.guarding import Steps
 

@@ -23,6 +23,7 @@ BENCHMARKS = (
     "monitor",
     "deadline",
     "faults",
+    "campaign",
 )
 PARTS = ("zr", "nao")
 

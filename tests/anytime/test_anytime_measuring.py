@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import anytime
 import compiler
 from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock
-from anytime.measuring import CHANGES, COMBINATIONS, STRATA, _design
+from anytime.sampling import CHANGES, COMBINATIONS, STRATA, _design
 
 MACHINE = Machine("m")
 for _name in ("see", "find", "merge", "walk"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import sys
 from pathlib import Path
@@ -22,6 +23,12 @@ def shape(text: str) -> list[list[str]]:
     return [line.split() for line in plain.strip().splitlines()]
 
 
+def has_what_it_needs(block: str) -> bool:
+    """Whether the package is installed that a block needs by its first line, `# needs NAME`."""
+    needed = re.match(r"# needs (\w+)\n", block)
+    return needed is None or importlib.util.find_spec(needed[1]) is not None
+
+
 def anchors(page: Path) -> set[str]:
     """The headings of a page as links name them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
@@ -36,7 +43,7 @@ def test_page_runs_from_top_to_bottom_and_prints_what_it_shows(page, tmp_path, m
     text, printed = page.read_text(encoding="utf-8"), ""
     for fence in FENCE.finditer(text):
         language, block = fence.groups()
-        if language == "python" and not block.startswith(SCRIPT):
+        if language == "python" and not block.startswith(SCRIPT) and has_what_it_needs(block):
             above = text[: fence.start(2)].count("\n")
             exec(compile("\n" * above + block, str(page), "exec"), namespace.__dict__)
             printed = capsys.readouterr().out

@@ -1,0 +1,1 @@
+"""Short tours through places."""
