@@ -17,11 +17,13 @@ from anytime.mail import ClosedError
 from anytime.results import Fault
 
 if TYPE_CHECKING:
+    from anytime.mail import Letter
     from anytime.running import Run
     from anytime.workers import Worker
 
 HUNG = 5.0  # seconds of real time without progress, after which a run on a work clock is cut
 STUBBORN = 16  # check-points after it was told to stop, after which such a run is cut
+_LISTENS = 0.002  # seconds between two questions whether a deadline's event has come
 _DRAIN = 0.002  # seconds past a deadline in which what was posted in time may still arrive
 
 
@@ -127,14 +129,14 @@ class _Isolated:
 
     def live(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """In real time."""
-        from anytime.worker_process import BEGUN, DONE, JOB, LEAVE, POST, STOP
+        from anytime.worker_process import BEGUN, DONE, JOB, LEAVE, POST
 
         worker, deadline = self.worker, self.run.deadline
         worker.idle, worker.ends = False, deadline.at
         complete, fault = False, None
         try:
             worker.mailbox.send(JOB, job, until=until)
-            while (letter := worker.receive(deadline.at)) is not None:
+            while (letter := self._heard()) is not None:
                 self.begun = True
                 if letter.kind == BEGUN:
                     continue
@@ -145,12 +147,32 @@ class _Isolated:
                     break
                 self._adopt(letter.content)
                 if letter.kind == POST and not self.may_step(self.run):
-                    worker.ends = time.perf_counter()
-                    worker.mailbox.send(STOP, until=worker.ends)
+                    self._stop()
                     break
+            else:
+                if deadline.interrupted():
+                    self._stop()
         except (ClosedError, TimeoutError, struct.error, pickle.UnpicklingError) as error:
             fault = self._died(error)
         return complete, self._unpacked() or fault
+
+    def _stop(self) -> None:
+        from anytime.worker_process import STOP
+
+        self.worker.ends = time.perf_counter()
+        self.worker.mailbox.send(STOP, until=self.worker.ends)
+
+    def _heard(self) -> Letter | None:
+        """The worker's next letter; None when the time is up, or when the event has come."""
+        deadline = self.run.deadline
+        until = deadline.at
+        while not deadline.interrupted():
+            if deadline.event is not None:
+                until = min(deadline.at, time.perf_counter() + _LISTENS)
+            letter = self.worker.receive(until)
+            if letter is not None or until >= deadline.at:
+                return letter
+        return None
 
     def live_told(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """On the caller's clock: each check-point waits for its answer."""
@@ -175,6 +197,7 @@ class _Isolated:
                     if letter.kind != POST:
                         continue
                     go = self.may_step(run) if run.module.generator else not deadline.expired()
+                    go = go and not deadline.interrupted()
                 except AnytimeError as error:
                     go, fault = False, Fault.of(error)
                 now = struct.pack("<d", deadline.clock.now())

@@ -14,12 +14,12 @@ from compiler.reading import program
 __all__ = [
     "Activity",
     "CompiledProgram",
+    "Interruptible",
     "all_of",
     "any_of",
     "at_least",
     "branch",
     "choose",
-    "Interruptible",
     "compile",
     "cvar",
     "equal_shares",

@@ -128,12 +128,15 @@ class CompiledProgram:
                 f"{duration(seconds)} is below the least budget of {self.name!r}, "
                 f"{duration(self.least)}"
             )
-        shares = self.frontier.shares[index].tolist()
-        if self.objective.timeless:
-            named = stretched(self.tables, shares, seconds)
-        else:  # more time was not worth its cost
-            named = {t.label: s for t, s in zip(self.tables, shares, strict=True) if not t.rule}
+        named = self.divided(self.frontier.shares[index].tolist(), seconds)
         return Allocation(seconds, named, self.promise(seconds))
+
+    def divided(self, shares: Sequence[float], seconds: float) -> Mapping[str, float]:
+        """Seconds of each call when a budget is divided like this row of the frontier's shares."""
+        if self.objective.timeless:
+            return stretched(self.tables, shares, seconds)
+        # More time was not worth its cost.
+        return {t.label: s for t, s in zip(self.tables, shares, strict=True) if not t.rule}
 
     @cached_property
     def profile(self) -> Profile:

@@ -40,8 +40,7 @@ def contract_of(what: Module | CompiledProgram) -> Contract:
             return execute(module, inputs, deadline, **filled, observe=observe)[0]
 
         return run_module
-    compiled = what
-    output = compiled.labels[-1]
+    compiled, output = what, what.program.output.label
 
     def run_program(
         inputs: tuple[Any, ...], deadline: Deadline, filled: Mapping[str, Any], observe: Observer
@@ -50,8 +49,14 @@ def contract_of(what: Module | CompiledProgram) -> Contract:
             if label == output:
                 observe(value, change)
 
-        named = dict(zip(compiled.program.inputs, inputs, strict=True))
-        return compiled.run(deadline=deadline, rng=filled.get("rng"), on_result=of_output, **named)
+        kept = filled.get("memory")
+        return compiled.run(
+            deadline=deadline,
+            rng=filled.get("rng"),
+            on_result=of_output,
+            memory=None if kept is None else {n: kept.setdefault(n, {}) for n in compiled.labels},
+            **dict(zip(compiled.program.inputs, inputs, strict=True)),
+        )
 
     return run_program
 
@@ -66,18 +71,22 @@ class _Best:
 
     def seen(self, value: Any, change: Change) -> None:
         """A result within a contract: better than the best only if that can be seen."""
-        if change.estimate is None:
-            return
-        if self.estimate is None or change.estimate > self.estimate:
+        if change.estimate is not None and (
+            self.estimate is None or change.estimate > self.estimate
+        ):
             self.run.record(value)
             self.estimate = change.estimate
 
     def finished(self, part: Result, seconds: float) -> None:
         """The result of a contract of this length; where nothing is seen the longest is best."""
-        if part and part.history[-1].estimate is None and seconds > self.longest:
+        if not part:
+            return
+        estimate = self.run.module.estimate
+        if estimate is not None:
+            self.seen(part.value, Change(0.0, 0.0, float(estimate(part.value))))
+        elif seconds > self.longest:
             self.run.record(part.value)
-        if part:
-            self.longest = max(self.longest, seconds)
+        self.longest = max(self.longest, seconds)
 
 
 def one_after_the_other(

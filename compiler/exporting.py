@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from anytime.files import Stored, write_record
 from compiler.compiled import CompiledProgram
+from compiler.division import Frontier
+
+Integers = NDArray[np.int64]
 
 SCHEMA = "anytime.exported/1"
 LONGEST = 2**31 - 1  # milliseconds: 24 days
@@ -24,57 +27,69 @@ LONGEST = 2**31 - 1  # milliseconds: 24 days
 class Exported:
     """The divisions of a program by whole milliseconds.
 
-    calls: labels, in order. from_ms: [R] the least budget of each row, increasing. share_us:
-    [R, n − 1] microseconds of each call but the last, which has the rest. quality: [R] expected.
+    calls: labels, in order. from_ms: [R] the least budget of each row, increasing. share_us: [R, n]
+    microseconds of each call. rest: [R, n] whether the budget is added to that; the share is then
+    what the others leave, and `share_us` says with a minus what those have. promised: [R] what the
+    result is expected to be worth.
     """
 
     name: str
     text: str
     machine: str
     calls: tuple[str, ...]
-    from_ms: NDArray[np.int64]
-    share_us: NDArray[np.int64]
-    quality: NDArray[np.float64]
+    from_ms: Integers
+    share_us: Integers
+    rest: NDArray[np.bool_]
+    promised: NDArray[np.float64]
 
 
 def exported(compiled: CompiledProgram) -> Exported:
     """The tables of a compiled program: the answers of `allocate` at every whole millisecond.
 
-    Raises AnytimeError for a program whose budgets do not fit into 32 bits of milliseconds, and
-    for one whose shares depend on more than the budget.
+    Raises AnytimeError for a program that decides while it runs, and for budgets that do not fit
+    into 32 bits of milliseconds.
     """
     frontier = compiled.frontier
-    if len(compiled.program.nodes) > len(compiled.labels) or compiled.program.parallels:
+    if compiled.policy is not None:
         raise AnytimeError(
-            f"{compiled.name!r} has branches, alternatives, parallels or several results; a table "
-            "of shares by budget holds programs that call one module after the other"
-        )
-    if compiled.policy is not None or not compiled.objective.timeless:
-        raise AnytimeError(
-            f"{compiled.name!r} decides its shares as it runs or ends early; compile it without "
-            "adaptive=True and without a utility of time"
+            f"{compiled.name!r} decides while it runs, by what is achieved, which no table of "
+            "budgets holds; compile it without adaptive=True to export it"
         )
     if not frontier.budgets[-1] < LONGEST / 1000:
         raise AnytimeError(
             f"budgets of {compiled.name!r} reach {frontier.budgets[-1]:.3g} s; a header holds "
             f"milliseconds in 32 bits, at most {LONGEST / 1000:.3g} s"
         )
-    near = np.floor(1000 * frontier.budgets).astype(np.int64)
-    # The least whole millisecond with which `allocate` itself takes this division or a later one.
-    candidates = near[:, None] + np.arange(-1, 3)
-    taken = np.array([[frontier.index(ms / 1000) for ms in row] for row in candidates.tolist()])
-    rows = np.arange(len(near))
-    from_ms = candidates[rows, (taken >= rows[:, None]).argmax(axis=1)]
+    from_ms = _from_ms(frontier)
     last = np.append(np.diff(from_ms) > 0, True)  # others lie between two milliseconds
+    budgets, shares = frontier.budgets[last], frontier.shares[last]
+    given = np.array([_shares(compiled, *row) for row in zip(shares, budgets, strict=True)])
+    more = np.array([_shares(compiled, *row) for row in zip(shares, budgets + 1, strict=True)])
+    rest = more - given > 0.5  # seconds of one more that the call has
     return Exported(
         name=compiled.name,
         text=repr(compiled.program),
         machine=compiled.machine,
         calls=compiled.labels,
         from_ms=from_ms[last],
-        share_us=np.rint(1e6 * frontier.shares[last, :-1]).astype(np.int64),
-        quality=frontier.promised[last],
+        share_us=np.rint(1e6 * (given - rest * budgets[:, None])).astype(np.int64),
+        rest=rest,
+        promised=frontier.promised[last],
     )
+
+
+def _from_ms(frontier: Frontier) -> Integers:
+    """The least whole millisecond with which `allocate` takes each division, or a later one."""
+    near = np.floor(1000 * frontier.budgets).astype(np.int64)
+    candidates = near[:, None] + np.arange(-1, 3)
+    taken = np.array([[frontier.index(ms / 1000) for ms in row] for row in candidates.tolist()])
+    rows = np.arange(len(near))
+    return candidates[rows, (taken >= rows[:, None]).argmax(axis=1)]
+
+
+def _shares(compiled: CompiledProgram, shares: NDArray[np.float64], seconds: float) -> list[float]:
+    """What each call gets of a budget by this division."""
+    return list(compiled.divided(shares.tolist(), seconds).values())
 
 
 class _Tables(Stored):
@@ -84,7 +99,8 @@ class _Tables(Stored):
     calls: list[str]
     from_ms: list[int]
     share_us: list[list[int]]
-    quality: list[float]
+    rest: list[list[int]]
+    promised: list[float]
 
 
 def write_json(tables: Exported, path: Path) -> None:
@@ -96,6 +112,7 @@ def write_json(tables: Exported, path: Path) -> None:
         calls=list(tables.calls),
         from_ms=tables.from_ms.tolist(),
         share_us=tables.share_us.tolist(),
-        quality=tables.quality.tolist(),
+        rest=tables.rest.astype(int).tolist(),
+        promised=tables.promised.tolist(),
     )
     write_record(path, SCHEMA, record)

@@ -29,17 +29,17 @@ _TEMPLATE = """\
 
 #include <stdint.h>
 
-/* A budget, divided: microseconds of each call in order, and the expected quality of the result,
- * 0 to 1. Below {least} ms there is no result: then all is 0. */
+/* A budget, divided: microseconds of each call in order, and what the result is expected to be
+ * worth. Below {least} ms there is no result: then all is 0. */
 typedef struct {{
 {fields}
-    double quality;
+    double promised;
 }} {name}_division;
 
 /* The best division of a budget in milliseconds. What a call leaves unspent is the next one's. */
 static inline {name}_division {name}_divide(int32_t budget_ms)
 {{
-    /* The least budget of each row; shares of all calls but the last, which has the rest. */
+    /* The least budget of each row; what each call has, to which some add the whole budget. */
 {tables}
     /* A row to begin at, by the budget above the least one, in steps of {bucket} ms. */
     {start}
@@ -52,7 +52,7 @@ static inline {name}_division {name}_divide(int32_t budget_ms)
         row = start[(uint32_t)(budget_ms - from_ms[0]) >> {shift}];
 {search}    }}
 {answer}
-    division.quality = quality[row];
+    division.promised = promised[row];
     return division;
 }}
 
@@ -73,21 +73,20 @@ def header(tables: Exported) -> str:
     """
     name, last = identifier(tables.name), len(tables.from_ms) - 1
     fields = [f"{field}_us" for field in identifiers(tables.calls)]
-    shares = dict(zip(fields[:-1], tables.share_us.T.tolist(), strict=True))
     start, shift = _index(tables.from_ms)
     # The rows between two entries of the index; a search by halving never looks beyond twice that.
     steps = int(np.diff(np.append(start, last)).max(initial=0)).bit_length()
     beyond = [LONGEST] * (2**steps - 1)
-    columns = [
-        _column("int32_t", "from_ms", tables.from_ms.tolist() + beyond),
-        *(_column(_integer(share), field, share) for field, share in shares.items()),
-        _column("double", "quality", tables.quality.tolist()),
-    ]
-    rest = "".join(f" - division.{field}" for field in shares)
-    answer = [
-        *(f"    division.{field} = {field}[row];" for field in shares),
-        f"    division.{fields[-1]} = INT64_C(1000) * budget_ms{rest};",
-    ]
+    columns = [_column("int32_t", "from_ms", tables.from_ms.tolist() + beyond)]
+    answer: list[str] = []
+    for field, us, rest in zip(fields, tables.share_us.T, tables.rest.T, strict=True):
+        columns.append(_column(_integer(us), field, us.tolist()))
+        if rest.any() and not rest.all():
+            columns.append(_column("uint8_t", f"{field}_rest", rest.astype(int).tolist()))
+        budget = "INT64_C(1000) * budget_ms + " if rest.any() else ""
+        factor = f"{field}_rest[row] * " if rest.any() and not rest.all() else ""
+        answer.append(f"    division.{field} = {factor}{budget}{field}[row];")
+    columns.append(_column("double", "promised", tables.promised.tolist()))
     return _TEMPLATE.format(
         text=_comment(tables.text),
         about=_comment(_about(tables)),
@@ -118,8 +117,8 @@ def _index(from_ms: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     return np.asarray(rows - 1, dtype=np.int64), shift
 
 
-def _integer(values: Sequence[int]) -> str:
-    return "int32_t" if max(values) < 2**31 else "int64_t"
+def _integer(values: NDArray[np.int64]) -> str:
+    return "int32_t" if np.abs(values).max() < 2**31 else "int64_t"
 
 
 def identifier(text: str) -> str:

@@ -13,7 +13,7 @@ from anytime.errors import AnytimeError
 from anytime.modules import Module
 from anytime.pictures import duration, figure, line_chart, number
 from anytime.profiles import Profile
-from anytime.programs import Input
+from anytime.programs import Call, Input
 from compiler.compiled import CompiledProgram
 from compiler.contracts import (
     Following,
@@ -24,7 +24,8 @@ from compiler.contracts import (
 )
 from compiler.curves import Curve, curve, curve_of
 from compiler.deadlines import WORST, Interruption, Survival, log_uniform, survival_of
-from compiler.retrying import Policy, retrying
+from compiler.objectives import EXPECTED
+from compiler.retrying import Retries, retrying
 from compiler.sequencing import (
     acceleration_ratio,
     best_sequence,
@@ -40,7 +41,7 @@ class Interruptible(Module):
 
     contract_profile: of one contract. profile: its own, with a result whenever a contract is done.
     lengths: seconds that each contract is told; none for a module that is interruptible as it is,
-    or whose contracts a policy chooses. policy: chooses by time and quality achieved.
+    or whose contracts `retries` chooses, by time and quality achieved.
     expected, doubling: expected quality when the interruption comes as assumed, of this and of
     doubling from the best first length. ratio: how many times as long as one contract it takes, at
     worst, to be as good as that; inf where there is no bound.
@@ -49,7 +50,7 @@ class Interruptible(Module):
     contract_profile: Profile
     profile: Profile
     lengths: tuple[float, ...] = ()
-    policy: Policy | None = None
+    retries: Retries | None = None
     expected: float
     doubling: float
     ratio: float
@@ -61,7 +62,7 @@ class Interruptible(Module):
     def __repr__(self) -> str:
         lines = [f"{self.name}({', '.join(self.parameters)}), interruptible"]
         expected = f"expected {number(self.expected)} at the interruption"
-        if self.policy is not None:
+        if self.retries is not None:
             lines.append(f"{expected}, contracts chosen by what is achieved")
         elif not self.lengths:
             lines[0] += " as it is: it registers results while it runs"
@@ -132,15 +133,15 @@ def interruptible(
     name = f"{module.name}_interruptible"
     if adaptive:
         _check_luck(module, _filled(contract), robustness)
-        policy, own = retrying(module, profile, survival)
+        retries, own = retrying(module, profile, survival)
         made = _sequence(
-            contract, module, lambda _, at, seen: policy.following(at, seen), again=True
+            contract, module, lambda _, at, seen: retries.following(at, seen), again=True
         )
         return Interruptible(
             **_fields(replace(made, name=name)),
             contract_profile=profile,
             profile=replace(own, module=name),
-            policy=policy,
+            retries=retries,
             expected=_expected(own, survival),
             doubling=doubling,
             ratio=math.inf,
@@ -177,6 +178,11 @@ def _described(
 ) -> tuple[Module, Profile, Curve]:
     """The module, its profile, and what contracts of each length are worth."""
     if isinstance(contract, CompiledProgram):
+        if contract.objective != EXPECTED:
+            raise AnytimeError(
+                f"{contract.name!r} was compiled for {contract.objective!r}; what a contract is "
+                "worth must be its expected quality, so compile it without objective=…"
+            )
         frontier = contract.frontier
         steps = curve(frontier.budgets, frontier.promised, contract.name)
         steps = replace(steps, sampled=_has_contracts(contract))
@@ -201,19 +207,19 @@ def _native(contract: Module | CompiledProgram) -> Module | None:
     call, on the program's inputs."""
     if isinstance(contract, Module):
         return None if contract.contract else contract
-    program = contract.program
-    names = tuple(a.name for a in program.output.arguments if isinstance(a, Input))
-    if len(program.calls) == 1 and names == program.inputs and not program.output.module.contract:
-        return program.output.module if len(names) == len(program.output.arguments) else None
-    return None
+    program, call = contract.program, contract.program.output
+    if len(program.nodes) > 1 or not isinstance(call, Call) or call.module.contract:
+        return None
+    names = tuple(a.name if isinstance(a, Input) else None for a in call.arguments)
+    return call.module if names == program.inputs else None
 
 
 def _filled(contract: Module | CompiledProgram) -> frozenset[str]:
     """What a run fills in for the contracts, besides their seconds."""
     if isinstance(contract, Module):
         return contract.filled - {"seconds"}
-    drawn = any("rng" in call.module.filled for call in contract.program.calls)
-    return frozenset({"rng"} if drawn else ())
+    modules = (call.module for call in contract.program.calls)
+    return frozenset[str]().union(*(module.filled for module in modules)) - {"seconds"}
 
 
 def _bound(robustness: float | None, interruption: Interruption | None, steps: Curve) -> float:

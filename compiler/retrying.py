@@ -27,8 +27,8 @@ OVER = 1e-3  # chance of still not being interrupted that ends the table
 
 
 @dataclass(frozen=True)
-class Policy:
-    """Which contract comes next.
+class Retries:
+    """Which contract comes next: a policy over time and quality achieved.
 
     lengths: [K] seconds of the contracts to choose from. levels: [L] qualities, levels[0] = 0 is
     "no result". cell: seconds. choices: [cells, L] place of the next contract; -1 = none is worth
@@ -55,7 +55,7 @@ class Policy:
         return 1 + int(np.argmin(np.abs(self.levels[1:] - quality)))
 
 
-def retrying(module: Module, profile: Profile, survival: Survival) -> tuple[Policy, Profile]:
+def retrying(module: Module, profile: Profile, survival: Survival) -> tuple[Retries, Profile]:
     """The best policy over (time, quality achieved) [ZCC03], and its profile.
 
     Takes the results of two contracts for independent of each other, whatever their lengths. So
@@ -93,7 +93,7 @@ def _chances(
     return rising[chosen], table.levels, table.chances[rows]
 
 
-def _policy(lengths: Floats, levels: Floats, chances: Floats, survival: Survival) -> Policy:
+def _policy(lengths: Floats, levels: Floats, chances: Floats, survival: Survival) -> Retries:
     """V(t, q) = max over L of (S(t) − S(t + L)) q + E V(t + L, max(q, q')), backwards in time."""
     horizon = float(lengths[-1])
     while horizon < 64 * lengths[-1] and survival(np.array([horizon]))[0] > OVER:
@@ -113,11 +113,11 @@ def _policy(lengths: Floats, levels: Floats, chances: Floats, survival: Survival
         going = value > worth[now] + 1e-12
         choices[now] = np.where(going, best, -1)
         worth[now] = np.where(going, value, worth[now])
-    return Policy(lengths, levels, cell, choices)
+    return Retries(lengths, levels, cell, choices)
 
 
 def _simulated(
-    policy: Policy, chances: Floats, label: str, rng: np.random.Generator
+    policy: Retries, chances: Floats, label: str, rng: np.random.Generator
 ) -> list[Recording]:
     """Runs of a policy whose contracts have these chances [K, L]."""
     cumulative: list[list[float]] = np.cumsum(chances, axis=1).tolist()

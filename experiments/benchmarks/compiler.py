@@ -63,9 +63,7 @@ def measure(
     figures |= _unseen(compiled, unseen, count=8 if quick else 16)
     progress("sequences of contracts, and the same in C")
     figures |= compiler_interruption.measure(compiled, unseen, quick=quick, seed=seed)
-    in_c, not_measured = compiler_export.measure(
-        compiled, random_program, programs=10 if quick else 40, seed=seed
-    )
+    in_c, not_measured = compiler_export.measure(compiled, programs=12 if quick else 42, seed=seed)
     figures |= in_c
     trees, dags = (200, 100) if quick else (2000, 1000)
     progress(f"{trees} trees and {dags} DAGs against brute force")

@@ -245,3 +245,36 @@ def test_a_module_is_pickled_by_its_name():
     assert pickle.loads(pickle.dumps(count)) is count
     with pytest.raises(pickle.PicklingError):
         pickle.dumps(in_process(count))
+
+
+# Interrupted by an event
+
+
+@anytime.module(isolated=True)
+def silent():
+    anytime.register(GOOD)
+    while True:  # no check-point any more
+        pass
+
+
+def test_an_event_ends_the_wait_for_a_worker_that_says_nothing():
+    heard = []
+    until = Deadline.after(LEFT)
+    until = Deadline(until.clock, until.at, event=lambda: len(heard) > 0)
+    result = anytime.run(
+        silent, deadline=until, on_result=lambda value, change: heard.append(value)
+    )
+    assert (result.status, result.value, result.fault) == (Status.INTERRUPTED, GOOD, None)
+    assert result.elapsed < LEFT / 2
+
+
+def test_an_event_stops_a_worker_on_a_work_clock_at_its_next_check():
+    clock = WorkClock(Machine("m").with_rate("count", 1.0))
+    until = Deadline(clock, event=lambda: clock.now() >= 2.0)
+    result = anytime.run(count, 10, deadline=until)
+    here = WorkClock(clock.machine)
+    same = anytime.run(
+        in_process(count), 10, deadline=Deadline(here, event=lambda: here.now() >= 2)
+    )
+    assert result.value == same.value
+    assert result.history == same.history

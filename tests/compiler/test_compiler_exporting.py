@@ -16,13 +16,14 @@ from anytime import AnytimeError
 from anytime.__main__ import main
 from compiler.exporting import Exported, exported, write_json
 from compiler.headers import header, identifier, identifiers
-from experiments.benchmarks.compiler import random_program
+from compiler.policies import Policy
+from experiments.benchmarks.compiler_constructs import KINDS
 from experiments.benchmarks.compiler_export import (
     AS_CPP,
     STRICT,
     budgets_for,
+    constructed,
     from_divisions,
-    from_tables,
     look_up,
     mismatches,
     random_frontier,
@@ -35,11 +36,7 @@ needs_gpp = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no 
 def programs(seed, count):
     rng = np.random.default_rng(seed)
     made = [from_divisions(random_frontier(rng), f"f{index}") for index in range(count)]
-    while len(made) < 2 * count:
-        compiled = from_tables(random_program(rng, True), f"t{len(made)}")
-        if len(compiled.frontier.budgets):
-            made.append(compiled)
-    return made
+    return made + [constructed(KINDS[n % len(KINDS)], rng, f"c{n}") for n in range(count)]
 
 
 def thinned(compiled, rng):
@@ -47,13 +44,28 @@ def thinned(compiled, rng):
     return np.unique(np.concatenate([budgets[:3], rng.choice(budgets, 150), budgets[-3:]]))
 
 
+def one_row(share, text="x"):
+    """Half a second divided: `share` seconds for one call, the rest for the other."""
+    us = int(1e6 * share)
+    return Exported(
+        name="x",
+        text=text,
+        machine="m",
+        calls=("a", "b"),
+        from_ms=np.array([500]),
+        share_us=np.array([[us, -us]]),
+        rest=np.array([[False, True]]),
+        promised=np.array([0.5]),
+    )
+
+
 def read(tables, budget_ms):
     """What a reader of the JSON does; the page on exporting shows it."""
     row = bisect.bisect_right(tables["from_ms"], budget_ms) - 1
     if row < 0:
         return [0] * (len(tables["calls"]) + 1)
-    shares = tables["share_us"][row]
-    return [*shares, 1000 * budget_ms - sum(shares), tables["quality"][row]]
+    both = zip(tables["share_us"][row], tables["rest"][row], strict=True)
+    return [*(us + rest * 1000 * budget_ms for us, rest in both), tables["promised"][row]]
 
 
 # Answers
@@ -80,7 +92,7 @@ def test_a_mismatch_would_be_found():
 def test_rows_that_no_whole_millisecond_takes_are_left_out():
     tables = exported(programs(3, 1)[0])
     assert (np.diff(tables.from_ms) > 0).all()
-    assert (np.diff(tables.quality) >= 0).all()
+    assert (np.diff(tables.promised) >= 0).all()
 
 
 @needs_gcc
@@ -152,9 +164,7 @@ def test_a_name_that_is_plain_stays():
 
 @given(text=st.text(max_size=60))
 def test_a_comment_ends_where_it_should(text):
-    one = np.array([0.5])
-    empty = np.zeros((1, 0), dtype=np.int64)
-    written = header(Exported("x", text, "m", ("a",), np.array([5]), empty, one))
+    written = header(one_row(0.0, text=text))
     assert written.count("*/") == written.count("/*")
     assert "??" not in written
     comment = written[: written.index("*/")]
@@ -171,14 +181,29 @@ def test_budgets_beyond_32_bits_are_refused():
         exported(replace(compiled, frontier=long))
 
 
+def test_a_program_that_decides_while_it_runs_is_refused():
+    (compiled, *_) = programs(1, 1)
+    deciding = replace(compiled, policy=Policy((), {}, {}))
+    with pytest.raises(AnytimeError, match="decides while it runs"):
+        exported(deciding)
+
+
+@needs_gcc
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_construct_is_exported(kind):
+    rng = np.random.default_rng(9)
+    made = [constructed(kind, rng, f"{kind} {number}") for number in range(4)]
+    asked = [thinned(compiled, rng) for compiled in made]
+    found = look_up([exported(compiled) for compiled in made], asked)
+    for compiled, budgets, answers in zip(made, asked, found, strict=True):
+        assert mismatches(compiled, budgets, answers) == 0
+
+
 @needs_gcc
 def test_a_single_division_and_days_of_budget_compile():
-    one = np.array([0.5])
     for share in (0.1, 3600.0):
-        tables = Exported(
-            "x", "x", "m", ("a", "b"), np.array([500]), np.array([[int(1e6 * share)]]), one
-        )
-        (answers,) = look_up([tables], [np.array([499, 500, 2**31 - 1], dtype=np.int32)])
+        asked = np.array([499, 500, 2**31 - 1], dtype=np.int32)
+        (answers,) = look_up([one_row(share)], [asked])
         rest = 1000.0 * np.array([500, 2**31 - 1]) - 1e6 * share
         assert answers[0].tolist() == [0, 0, 0]
         assert answers[1:, 1].tolist() == rest.tolist()

@@ -228,6 +228,50 @@ def test_results_within_a_contract_are_there_at_once_when_they_can_be_seen_to_be
     assert estimates == sorted(estimates)
 
 
+def test_modules_of_a_program_keep_their_memory_from_contract_to_contract():
+    calls = []
+
+    @anytime.module(quality=lambda found: found, name="find")
+    def remembers(seen, hard, *, memory):
+        memory["times"] = memory.get("times", 0) + 1
+        calls.append(memory["times"])
+        anytime.charge(0.02)
+        yield seen * 0.5
+        anytime.charge(0.05)
+        yield seen
+
+    @compiler.program
+    def kept(hard):
+        return remembers(see(hard), hard)
+
+    measured = anytime.measure(kept, problems(), seconds=1.0, clock=clock)
+    patient = compiler.interruptible(compiler.compile(kept, measured))
+    calls.clear()
+    anytime.run(patient, 1.0, deadline=Deadline(clock()))
+    assert calls == list(range(1, len(calls) + 1))
+    assert len(calls) > 1
+
+
+def test_the_output_may_be_a_choice_of_results():
+    @anytime.module(quality=lambda found: found, estimate=lambda found: found, name="solve")
+    def other(seen, hard):
+        anytime.charge(0.03)
+        yield 0.9 * seen
+
+    @compiler.program
+    def either(hard):
+        seen = see(hard)
+        return compiler.choose(find(seen, hard), other(seen, hard))
+
+    measured = anytime.measure(either, problems(), seconds=1.0, clock=clock)
+    patient = compiler.interruptible(compiler.compile(either, measured))
+    result = anytime.run(patient, 1.0, deadline=Deadline(clock()))
+    assert result.fault is None
+    assert result.value >= 0.9
+    estimates = [change.estimate for change in result.history]
+    assert estimates == sorted(estimates)
+
+
 def test_it_achieves_what_it_promises(schedule):
     when = stats.uniform(0, 0.3)
     patient = compiler.interruptible(schedule, interruption=when)
@@ -367,6 +411,13 @@ def test_luck_needs_a_generator_an_estimate_and_no_bound(library):
 
 
 # Refusing
+
+
+def test_a_program_compiled_for_something_else_is_refused():
+    measured = anytime.measure(fetch, problems(), seconds=1.0, clock=clock)
+    compiled = compiler.compile(fetch, measured, objective=compiler.at_least(0.5))
+    with pytest.raises(AnytimeError, match=r"compiled for at_least\(0.5\)"):
+        compiler.interruptible(compiled)
 
 
 def test_what_cannot_be_made_is_refused_in_one_line(library):
