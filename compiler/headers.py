@@ -10,10 +10,9 @@ from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anytime.files import write_atomically
-from compiler.exporting import LONGEST, Exported
+from compiler.exporting import LONGEST, Exported, Integers
 
 BUCKETS = 1024  # of the index, at most: two kilobytes
 
@@ -73,10 +72,8 @@ def header(tables: Exported) -> str:
     """
     name, last = identifier(tables.name), len(tables.from_ms) - 1
     fields = [f"{field}_us" for field in identifiers(tables.calls)]
-    start, shift = _index(tables.from_ms)
-    # The rows between two entries of the index; a search by halving never looks beyond twice that.
-    steps = int(np.diff(np.append(start, last)).max(initial=0)).bit_length()
-    beyond = [LONGEST] * (2**steps - 1)
+    start, shift, steps = _index(tables.from_ms)
+    beyond = [LONGEST] * (2**steps - 1)  # where the search may look
     columns = [_column("int32_t", "from_ms", tables.from_ms.tolist() + beyond)]
     answer: list[str] = []
     for field, us, rest in zip(fields, tables.share_us.T, tables.rest.T, strict=True):
@@ -108,16 +105,22 @@ def header(tables: Exported) -> str:
     )
 
 
-def _index(from_ms: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """The row at the beginning of each bucket of 2^shift ms, at most `BUCKETS`, and the shift."""
+def _index(from_ms: Integers) -> tuple[Integers, int, int]:
+    """The row at the beginning of each bucket of 2^shift ms, at most `BUCKETS`; the shift; and how
+    many halvings lead to any row that begins within a bucket."""
     span = int(from_ms[-1] - from_ms[0])
     shift = max(0, (span // BUCKETS).bit_length())
-    begins = from_ms[0] + (np.arange((span >> shift) + 1) << shift)
-    rows = np.searchsorted(from_ms, np.asarray(begins, dtype=np.int64), side="right")
-    return np.asarray(rows - 1, dtype=np.int64), shift
+    begins = from_ms[0] + (np.arange((span >> shift) + 1, dtype=np.int64) << shift)
+    start = _row(from_ms, begins)
+    within = _row(from_ms, begins + (2**shift - 1)) - start
+    return start, shift, int(within.max()).bit_length()
 
 
-def _integer(values: NDArray[np.int64]) -> str:
+def _row(from_ms: Integers, budgets: Integers) -> Integers:
+    return np.asarray(np.searchsorted(from_ms, budgets, side="right") - 1, dtype=np.int64)
+
+
+def _integer(values: Integers) -> str:
     return "int32_t" if np.abs(values).max() < 2**31 else "int64_t"
 
 
