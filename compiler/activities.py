@@ -140,7 +140,7 @@ def _alike(one: float, other: float) -> bool:
 def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledProgram:
     """The program with its modules so many times as slow as measured, divided anew.
 
-    An adaptive policy was made for the times as measured, so it is left aside.
+    An adaptive policy and recorded problems belong to the times as measured: they are left aside.
     """
     if all(ratio == 1.0 for ratio in ratios.values()):
         return program
@@ -155,5 +155,5 @@ def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledPr
         )
         for name, known in program.steps.items()
     }
-    frontier = divide(tables, program.objective)
-    return replace(program, tables=tables, frontier=frontier, steps=steps, policy=None)
+    frontier = program.calibration.applied(divide(tables, program.objective))
+    return replace(program, tables=tables, frontier=frontier, steps=steps, policy=None, replay=None)
