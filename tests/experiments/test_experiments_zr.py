@@ -86,7 +86,7 @@ def test_the_compiled_profile_is_ordered_and_above_min_and_max():
     found = dividing.divided(0, PAPER, 6)
     curves = found.curves(np.array([dividing.SECONDS]))
     assert (np.diff(curves[:, 0]) > 0.0).all()
-    assert (found.promised() >= np.maximum(*found.pinned()) - dividing.CLOSE).all()
+    assert (found.divided() >= np.maximum(*found.pinned()) - dividing.CLOSE).all()
 
 
 def test_a_task_is_lived_as_decided_and_the_paper_steers_by_its_four_cases(monkeypatch):
