@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,6 +11,9 @@ from numpy.typing import NDArray
 from anytime import ProfileLibrary, WorkClock, measure
 from compiler import CompiledProgram, compile
 from compiler.baselines import maximal, minimal
+from compiler.curves import curve
+from compiler.division import expected_quality, moments_within
+from compiler.sequencing import acceleration_ratio, doubled, least_ratio
 from experiments.benchmarks.compiler import _mismatch, random_program
 from experiments.domains import MACHINE, cross, cross_anywhere, domain
 from experiments.reproduction.abstraction import FAMILY, SIZE
@@ -41,9 +43,16 @@ class Divided:
         """Seconds, from the least that gives a plan to what suffices for everything."""
         return np.linspace(self.compiled.least, float(self.compiled.frontier.budgets[-1]), BUDGETS)
 
-    def promised(self) -> NDArray[np.float64]:
-        """Expected quality of the compiled program for each budget."""
-        return np.array([self.compiled.promise(seconds) for seconds in self.budgets])
+    def divided(self) -> NDArray[np.float64]:
+        """Expected quality of the compiled division for each budget, by the profiles as MIN's and
+        MAX's are; `promise` would be that of domains never seen."""
+        tables, labels = self.compiled.tables, self.compiled.labels
+        found: list[float] = []
+        for seconds in self.budgets:
+            shares = self.compiled.allocate(float(seconds)).shares
+            moments = moments_within(tables, [shares[label] for label in labels])
+            found.append(expected_quality(tables, moments))
+        return np.array(found)
 
     def pinned(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Those of MIN and of MAX."""
@@ -87,33 +96,15 @@ def compiled_above_min_max(seed: int, way: Way) -> bool:
     """At every budget the compiled profile is at least MIN's and MAX's, somewhere above both."""
     found = divided(seed, way)
     better = np.maximum(*found.pinned())
-    apart = found.promised() - better
+    apart = found.divided() - better
     return bool(apart.min() >= -CLOSE and apart.max() > CLOSE)
 
 
 def interruptible(seed: int, way: Way) -> tuple[float, ...]:
-    """How many times as long the interruptible construction takes at worst, after its first result,
-    to be as good as one contract: contracts each twice as long as the one before [RZ91]."""
-    found = divided(seed, way)
-    return (acceleration(found.budgets, found.promised()),)
-
-
-def acceleration(
-    budgets: NDArray[np.float64], promised: NDArray[np.float64], factor: float = 2.0
-) -> float:
-    """The least r so that contracts of lengths b, b · factor, … one after the other, after r · t
-    seconds are as good as one contract of t seconds, for every t from the first result on.
-
-    budgets: seconds [n], increasing; promised: expected quality of a contract that long [n].
-    """
-    best = np.maximum.accumulate(promised)
-    lengths = budgets[0] * factor ** np.arange(64)
-    lengths = lengths[: int(np.searchsorted(lengths, budgets[-1])) + 1]
-    ends = np.cumsum(lengths)
-    worth = best[np.searchsorted(budgets, lengths * (1.0 + 1e-12), side="right") - 1]
-    ratios = [
-        ends[int(np.argmax(worth >= quality - 1e-12))] / seconds
-        for seconds, quality in zip(budgets, best, strict=True)
-        if quality > 0.0
-    ]
-    return float(max(ratios, default=math.nan))
+    """How many times as long an interruptible sequence of contracts takes at worst to be as good as
+    one contract: each twice as long as the one before [RZ91]; of ours, the best lengths."""
+    compiled = divided(seed, way).compiled
+    steps = curve(compiled.frontier.budgets, compiled.frontier.promised, compiled.name)
+    if way is PAPER:
+        return (acceleration_ratio(steps, doubled(steps, float(steps.lengths[0]))),)
+    return (least_ratio(steps),)

@@ -8,15 +8,17 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from experiments.reproduction.rows import COMMANDS, PAPERS, PART, cell, rows_of, shown, summary
+from experiments.reproduction.rows import COMMANDS, PAPERS, PART, Row, cell, rows_of, shown, summary
 
+CLAIMED = "what is claimed"
+_KIND = {CLAIMED: "text"}  # columns of words
 _STYLE = """
 :root { color-scheme: light; }
 body { margin: 0 auto; max-width: 76rem; padding: 1rem; font: 1rem/1.5 system-ui, sans-serif; }
 .wide { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .9rem; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid #ddd; }
-th:first-child, td:first-child, td.text { text-align: left; }
+th:first-child, th.text, td:first-child, td.text { text-align: left; }
 td { white-space: nowrap; }
 td.text { white-space: normal; min-width: 14rem; }
 td.holds { color: #006644; } td.no, td.only { color: #a33d00; font-weight: 600; }
@@ -62,8 +64,8 @@ def _command(paper: str, told: Mapping[str, Any]) -> str:
     return escape(f"{COMMANDS[paper]} --seed {told['seed']}{quick}")
 
 
-def _claims(rows: Sequence[Any]) -> str:
-    head = ("claim", "the paper's words", "paper", "its way", "low to high", "ours", "")
+def _claims(rows: Sequence[Row]) -> str:
+    head = ("claim", CLAIMED, "paper", "its way", "low to high", "ours", "")
     body = [
         f'<tr><td>{escape(r.name)}<td class="text">{escape(r.text)}<td>{r.paper}<td>{r.ours}'
         f'<td>{r.bounds}<td>{r.best}<td class="{r.sign.split()[0]}">{r.sign}'
@@ -82,7 +84,7 @@ def _sweep(sweep: Mapping[str, Any]) -> str:
 
 
 def _table(head: Sequence[str], body: Sequence[str]) -> str:
-    titles = "".join(f"<th>{escape(title)}" for title in head)
+    titles = "".join(f'<th class="{_KIND.get(title, "")}">{escape(title)}' for title in head)
     return f'<div class="wide"><table><tr>{titles}{"".join(body)}</table></div>'
 
 

@@ -25,7 +25,7 @@ def results(told: Mapping[str, Any]) -> str:
         if not rows:
             continue
         lines += ["", f"## {short}", "", full, "", "```sh", COMMANDS[paper], "```", ""]
-        head = ("claim", "the paper's words", "paper", "its way", "low to high", "ours", "")
+        head = ("claim", "what is claimed", "paper", "its way", "low to high", "ours", "")
         lines += _table(
             head,
             [(r.name, r.text, r.paper, r.ours, r.bounds, r.best, _strong(r.sign)) for r in rows],

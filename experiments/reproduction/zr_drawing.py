@@ -161,7 +161,7 @@ def _profiles(folder: Path, seed: int) -> tuple[Picture, Picture]:
     longest = min(float(found.budgets[-1]) for found in libraries)
     budgets = np.linspace(0.0, longest, 200)
     drawn: Sequence[tuple[str, list[np.ndarray]]] = (
-        ("compiled", [np.interp(budgets, f.budgets, f.promised(), left=0.0) for f in libraries]),
+        ("compiled", [np.interp(budgets, f.budgets, f.divided(), left=0.0) for f in libraries]),
         ("MIN", [np.interp(budgets, f.budgets, f.pinned()[0], left=0.0) for f in libraries]),
         ("MAX", [np.interp(budgets, f.budgets, f.pinned()[1], left=0.0) for f in libraries]),
     )
