@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from compiler.replaying import Replay
 from compiler.tables import Table, tables
 
 Floats = NDArray[np.float64]
+RUN = 12  # budgets at which a program is run to calibrate it
 BOOTSTRAPPED = 8  # budgets at which intervals are found by bootstrap
 RESAMPLES = 60  # of the problems, for these
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
@@ -82,10 +83,30 @@ def calibrate(
     """
     knots = _knots(frontier, KNOTS * DIVIDED // max(DIVIDED, len(program.calls)))
     values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
-    standing = _standing(values)
-    kept = standing[
-        np.searchsorted(knots, np.arange(len(frontier.budgets))).clip(0, len(knots) - 1)
+    return _calibrated(frontier, knots, values)
+
+
+def calibrate_by_running(
+    tables: Sequence[Table], frontier: Frontier, run: Callable[[Sequence[float]], Floats]
+) -> tuple[Frontier, Calibration]:
+    """The same from really running a program: run(budgets) gives qualities [P, budgets] on
+    problems that the divisions were not chosen on."""
+    knots = _knots(frontier, RUN)
+    values = run(frontier.budgets[knots].tolist())
+    worth = [
+        expected_quality(tables, moments_within(tables, shares.tolist()))
+        for shares in frontier.shares
     ]
+    return _calibrated(replace(frontier, promised=np.array(worth)), knots, values)
+
+
+def _calibrated(
+    frontier: Frontier, knots: NDArray[np.intp], values: Floats
+) -> tuple[Frontier, Calibration]:
+    """From what the tables say, and qualities [P, K] lived at some places of the frontier."""
+    standing = _standing(values)
+    knot_of = np.searchsorted(knots, np.arange(len(frontier.budgets))).clip(0, len(knots) - 1)
+    kept = standing[knot_of]
     calibration = _isotonic(frontier.promised[knots[standing]], values[:, standing])
     frontier = replace(
         frontier,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,7 +21,7 @@ from anytime.results import Result, Status
 from compiler import baselines
 from compiler.adaptive import ceiling
 from compiler.advising import Advice, advise
-from compiler.calibrating import Calibration
+from compiler.calibrating import Calibration, calibrate_by_running
 from compiler.costs import stretched
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.executing import Execution, Listener, Memory, planned, status_of, unwanted
@@ -32,7 +32,7 @@ from compiler.policies import Plan, Policy
 from compiler.replaying import Replay
 from compiler.storing import save
 from compiler.tables import Table
-from compiler.validating import Validation, validate
+from compiler.validating import Validation, lived, validate
 
 if TYPE_CHECKING:
     from compiler.activities import Activity
@@ -336,6 +336,29 @@ class CompiledProgram:
         Raises AnytimeError for less than two problems or one without a needed attribute.
         """
         return validate(self, problems, budgets=budgets or self._budgets(), clock=clock, seed=seed)
+
+    def calibrated(
+        self,
+        problems: Iterable[Any],
+        *,
+        clock: Callable[[], Clock] = WallClock,
+        seed: int = 0,
+    ) -> CompiledProgram:
+        """This program with promises from really running it on problems that the profiles never
+        saw, for where `validate` shows that those from recordings do not hold: in long programs
+        the quality of an input may not be enough to describe it. Divisions that achieve less than
+        others with less time are dropped.
+
+        Raises AnytimeError as `validate` does.
+        """
+        listed = list(problems)
+
+        def run(budgets: Sequence[float]) -> Floats:
+            lives = lived(self, listed, budgets, clock, seed)
+            return np.nan_to_num(lives.qualities[self.program.output.label]).T
+
+        frontier, calibration = calibrate_by_running(self.tables, self.frontier, run)
+        return replace(self, frontier=frontier, calibration=calibration)
 
     def save(self, path: str | Path) -> None:
         """Write the compiled program to a file; `compiler.load` reads it back."""

@@ -134,12 +134,29 @@ def validate(
     Raises AnytimeError for less than two problems or one without a needed attribute.
     """
     listed = list(problems)
+    lives = lived(compiled, listed, budgets, clock, seed)
+    output = np.nan_to_num(lives.qualities[compiled.program.output.label])
+    rows = tuple(
+        _reliability(compiled, float(budget), values)
+        for budget, values in zip(budgets, output, strict=True)
+    )
+    return Validation(compiled.name, len(listed), rows, findings(compiled.program, lives))
+
+
+def lived(
+    compiled: Runnable,
+    listed: Sequence[Any],
+    budgets: Sequence[float],
+    clock: Callable[[], Clock],
+    seed: int,
+) -> Lives:
+    """What each call achieves at each budget on each problem, as `validate` has it."""
     if len(listed) < 2:
-        raise AnytimeError("validate needs two problems at least, which the profiles never saw")
+        raise AnytimeError("give two problems at least, which the profiles never saw")
     program = compiled.program
     if not isinstance(program.output, Call):
         raise AnytimeError(
-            f"{compiled.name} ends in {program.output!r}; validate takes a program that ends in a "
+            f"{compiled.name} ends in {program.output!r}; give a program that ends in a "
             "call, whose module can score the result"
         )
     for place, problem in enumerate(listed):
@@ -169,13 +186,7 @@ def validate(
         call.label: _qualities(raw[call.label], cheapest.get(call.module.name))
         for call in program.calls
     }
-    output = np.nan_to_num(qualities[program.output.label])
-    rows = tuple(
-        _reliability(compiled, float(budget), values)
-        for budget, values in zip(budgets, output, strict=True)
-    )
-    lives = Lives(qualities, spent, known, _attributes(listed))
-    return Validation(compiled.name, len(listed), rows, findings(program, lives))
+    return Lives(qualities, spent, known, _attributes(listed))
 
 
 def in_time(

@@ -57,15 +57,20 @@ def measure_rover(*, quick: bool, seed: int, progress: Callable[[str], None]) ->
         clock=lambda: WorkClock(rover.MACHINE),
         seed=seed,
     )
-    progress("compiling the rover")
-    compiled = compile(rover.turn, library)
+    progress("compiling the rover, and running it on as many new turns to calibrate its promises")
+    recorded = compile(rover.turn, library)
+    compiled = recorded.calibrated(
+        rover.turns(known, seed + 50), clock=lambda: WorkClock(rover.MACHINE), seed=seed
+    )
     progress(f"running the rover on {unseen} turns never seen")
     found = compiled.validate(
         rover.turns(unseen, seed + 99), clock=lambda: WorkClock(rover.MACHINE), seed=seed
     )
+    from_recordings = [abs(recorded.promise(row.seconds) - row.achieved) for row in found.rows]
     return {
         "real.modules": len(compiled.labels),
         "real.promise_error": found.error,
+        "real.promise_error_from_recordings": max(from_recordings),
         "real.budgets": len(found.rows),
         "real.budgets_held": sum(row.holds for row in found.rows),
         "real.quality": found.rows[-1].achieved,

@@ -122,3 +122,16 @@ def test_costs_are_compared_with_the_cheapest_known():
     found = schedule(walk).validate(scenes(30, 4), clock=clock)
     assert found.holds
     assert 0.2 < found.rows[0].achieved < found.rows[-1].achieved <= 1
+
+
+def test_promises_can_be_calibrated_by_running():
+    compiled = schedule(act_anywhere)
+    dark = [Scene(f"dark {i}", 0.3 + 0.01 * i, 0.0, 0.0) for i in range(30)]
+    found = compiled.calibrated(dark, clock=clock)
+    assert not compiled.validate(dark, clock=clock).holds
+    assert found.validate(dark, clock=clock).holds
+    promised = [found.promise(seconds) for seconds in np.linspace(0, 0.2, 50)]
+    assert promised == sorted(promised)
+    for seconds in np.linspace(found.least, 0.2, 9):
+        low, high = found.interval(seconds)
+        assert low <= found.promise(seconds) <= high
