@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from experiments import shipped
 from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.monitor_gate import gate_figures
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_traces import trace_figures
@@ -42,10 +43,7 @@ MISSIONS = 5_000  # that check each computed worth
 TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
-LATER = {
-    "gate.found": "there is no value gate yet",
-    "gate.false_alarms": "there is no value gate yet",
-}
+TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
 
 
 def measure(
@@ -59,7 +57,7 @@ def measure(
 ) -> Benchmark:
     """All figures; those of `traces.` if a folder is given or `$ANYTIME_TRACES` or the usual place
     has one."""
-    missing = dict(LATER)
+    missing: dict[str, str] = {}
     settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
     figures: dict[str, float | int | None] = {}
     found: dict[str, list[float]] = {}
@@ -91,6 +89,9 @@ def measure(
     progress("forks")
     briefing = brief(read_mission(shipped.mission_path()), shipped.profiles(), BRIEF)
     figures |= fork_figures(briefing, seed)
+    of_gate, gate_settings = gate_figures(seed, QUICK_TRIALS if quick else TRIALS, progress)
+    figures |= of_gate
+    settings |= gate_settings
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()

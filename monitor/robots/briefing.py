@@ -207,8 +207,14 @@ class Briefing:
 
 def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = None) -> Briefing:
     """Compile the paper's program for a mission's machine and measure the mission's rhythm."""
+    return brief_with(compile(navigate, library.on(grid.machine)), grid, effort)
+
+
+def brief_with(
+    program: CompiledProgram, grid: GridMission, effort: Effort | None = None
+) -> Briefing:
+    """Measure a mission's rhythm with a program that is compiled already."""
     effort = effort or effort_for(grid.scene)
-    program = compile(navigate, library.on(grid.machine))
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)
     seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)

@@ -1,4 +1,4 @@
-"""Commands of the robots: run a monitored mission, serve a simulated NAO."""
+"""Commands of the robots: run a monitored mission, compare, serve a simulated NAO."""
 
 from __future__ import annotations
 
@@ -45,6 +45,15 @@ def declare(commands: Any) -> None:
         default=Path("anytime-run"),
         metavar="DIR",
         help="for the log and the page (default anytime-run)",
+    )
+
+    summary = "what a change of profiles costs in the value of a mission"
+    parser = add_command(commands, "compare", compare_sides, summary)
+    for name in ("before", "after"):
+        parser.add_argument(name, type=Path, help="a folder of profiles, or a schedule")
+    parser.add_argument("--mission", type=Path, required=True, metavar="MISSION.toml")
+    parser.add_argument(
+        "--tolerance", type=_tolerated, default=0.0, metavar="V", help="loss put up with (default 0)"
     )
 
     parser = add_command(commands, "nao-sim", nao_sim, "serve a simulated NAO over NAOqi")
@@ -121,6 +130,30 @@ def run(options: argparse.Namespace) -> Answer:
         },
         0 if report else 1,
     )
+
+
+def compare_sides(options: argparse.Namespace) -> Answer:
+    """What a change costs, with its 95 % interval; exit code 1 if a loss is shown."""
+    from monitor.robots.comparing import compare
+    from monitor.robots.grid_missions import read_mission
+
+    grid = read_mission(options.mission)
+    with progress("living the mission"):
+        found = compare(options.before, options.after, grid, options.tolerance)
+    figures = {
+        "before": found.before,
+        "after": found.after,
+        "loss": found.loss,
+        "loss_low": found.low,
+        "loss_high": found.high,
+        "tolerance": found.tolerance,
+        "shown": found.shown,
+        "modules": {
+            name: {"slower": shift.slower, "quality": shift.quality, "loss": found.parts[name]}
+            for name, shift in found.shifts.items()
+        },
+    }
+    return Answer(repr(found), figures, 1 if found.shown else 0)
 
 
 def _run_nao(options: argparse.Namespace) -> Answer:
@@ -223,6 +256,10 @@ def _ends(floor: Path | None, index: int) -> tuple[tuple[int, int], tuple[int, i
     if not 0 <= index < len(scenarios):
         raise AnytimeError(f"{file} has scenarios 0 to {len(scenarios) - 1}, not {index}")
     return scenarios[index].start, scenarios[index].goal
+
+
+def _tolerated(text: str) -> float:
+    return 0.0 if text.strip() in ("0", "0.0") else positive(text)
 
 
 def _cell(text: str) -> tuple[int, int]:
