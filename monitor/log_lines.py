@@ -204,13 +204,25 @@ class EndLine(_Line, frozen=True, tag_field="kind", tag="end"):
     fault: str = ""
 
 
+class RegretLine(_Line, frozen=True, tag_field="kind", tag="regret"):
+    """Other decisions of a frame as (shares, speed, net value of the mission with it): see
+    `monitor.regrets`. It stands behind the end."""
+
+    frame: int
+    forks: tuple[tuple[dict[str, float], float, float], ...]
+
+
 @dataclass(frozen=True)
 class Log:
-    """A mission as it was logged; `end` is None while it goes on or when it was cut off."""
+    """A mission as it was logged; `end` is None while it goes on or when it was cut off.
+
+    regrets: by frame, of missions whose decisions were lived again.
+    """
 
     mission: MissionLine
     frames: tuple[FrameLine, ...] = ()
     end: EndLine | None = None
+    regrets: tuple[RegretLine, ...] = ()
 
     @property
     def promised(self) -> float | None:

@@ -13,7 +13,7 @@ import msgspec
 from anytime.errors import AnytimeError
 from anytime.files import LARGEST
 from monitor.endings import Ending
-from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLine
+from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLine, RegretLine
 from monitor.missions import Energy, Value
 
 
@@ -36,10 +36,20 @@ def read_log(path: Path | str) -> Log:
     mission: MissionLine | None = None
     frames: list[FrameLine] = []
     end: EndLine | None = None
+    regrets: list[RegretLine] = []
     for number, text in enumerate(lines, 1):
         line = _parsed(text, f"{path}:{number}")
         if isinstance(line, MissionLine) and mission is None:
             mission = line
+        elif isinstance(line, RegretLine):
+            if end is None or line.frame != len(regrets) or line.frame >= len(frames):
+                raise AnytimeError(
+                    f"{path}:{number}: the regret of frame {line.frame}; they follow the end, "
+                    "one for each frame in order"
+                )
+            if not line.forks:
+                raise AnytimeError(f"{path}:{number}: a regret is made of one fork or more")
+            regrets.append(line)
         elif mission is None or end is not None or isinstance(line, MissionLine):
             raise AnytimeError(f"{path}:{number}: a log is one mission, its frames and one end")
         elif isinstance(line, EndLine):
@@ -54,13 +64,13 @@ def read_log(path: Path | str) -> Log:
             frames.append(line)
     if mission is None:
         raise AnytimeError(f"{path}: not a log: its first line must be the mission")
-    return Log(mission, tuple(frames), end)
+    return Log(mission, tuple(frames), end, tuple(regrets))
 
 
-def _parsed(text: bytes, where: str) -> MissionLine | FrameLine | EndLine:
+def _parsed(text: bytes, where: str) -> MissionLine | FrameLine | EndLine | RegretLine:
     try:
         content = json.loads(text, object_pairs_hook=_unique, parse_constant=_refused)
-        line = msgspec.convert(content, MissionLine | FrameLine | EndLine)
+        line = msgspec.convert(content, MissionLine | FrameLine | EndLine | RegretLine)
     except msgspec.ValidationError as error:
         raise AnytimeError(f"{where}: {error}") from None
     except json.JSONDecodeError as error:

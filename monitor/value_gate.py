@@ -180,9 +180,7 @@ def gate(foresight: Foresight, shifts: Shifts, tolerance: float = 0.0) -> Gate:
     error = float(losses.std()) * (GROUPS - 1) ** 0.5
     reach = float(stats.t.ppf(0.975, GROUPS - 1)) * error + LEAST * foresight.mission.value.worth
     loss = before - after
-    alone = {
-        label: before - foresight.worth({label: shift}) for label, shift in shifts.all.items()
-    }
+    alone = {label: before - foresight.worth({label: shift}) for label, shift in shifts.all.items()}
     name = foresight.mission.name
     return Gate(name, before, after, loss - reach, loss + reach, tolerance, shifts.all, alone)
 

@@ -40,6 +40,9 @@ def declare(commands: Any) -> None:
     parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
     parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
     parser.add_argument(
+        "--regret", type=natural, default=0, metavar="N", help="live N other decisions a frame, too"
+    )
+    parser.add_argument(
         "--log",
         type=folder,
         default=Path("anytime-run"),
@@ -53,7 +56,11 @@ def declare(commands: Any) -> None:
         parser.add_argument(name, type=Path, help="a folder of profiles, or a schedule")
     parser.add_argument("--mission", type=Path, required=True, metavar="MISSION.toml")
     parser.add_argument(
-        "--tolerance", type=_tolerated, default=0.0, metavar="V", help="loss put up with (default 0)"
+        "--tolerance",
+        type=_tolerated,
+        default=0.0,
+        metavar="V",
+        help="loss put up with (default 0)",
     )
 
     parser = add_command(commands, "nao-sim", nao_sim, "serve a simulated NAO over NAOqi")
@@ -78,6 +85,7 @@ def run(options: argparse.Namespace) -> Answer:
     from anytime.faults import FaultyClock, read_schedule
     from monitor.logs import read_log
     from monitor.page import write_page
+    from monitor.regrets import log_regrets, regrets
     from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.faulty import kinds_of
     from monitor.robots.grid_missions import read_mission
@@ -95,6 +103,11 @@ def run(options: argparse.Namespace) -> Answer:
         raise AnytimeError(f"--drift {options.drift} is for a NAO's scene, not for a grid mission")
     if options.faults is not None and not options.faults.is_file():
         raise AnytimeError(f"{options.faults}: no such file of faults")
+    if options.regret and (options.regret < 2 or options.faults or options.clock == "wall"):
+        raise AnytimeError(
+            f"--regret {options.regret}: it takes 2 or more, and a mission that can be lived again: "
+            "without --faults, on the work clock"
+        )
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
     start, goal = options.start, options.goal
@@ -114,6 +127,11 @@ def run(options: argparse.Namespace) -> Answer:
             clock = FaultyClock(grid.machine, faults)
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed, clock=clock, log=log, faults=faults)
+    if options.regret:
+        shares = briefing.contracts.shares
+        with progress("living other decisions") as bar:
+            found = regrets(report, grid.mission, shares, count=options.regret, progress=bar)
+        log_regrets(log, found)
     page = write_page([read_log(log)], options.log / "mission.html")
     return Answer(
         f"{report!r}\n{_wide(grid)}\nlog {log}, page {page}",

@@ -23,7 +23,9 @@ def recording(problem, pace, best=0.9):
     work = np.arange(1.0, 21.0)
     quality = best * (1 - np.exp(-work / 6))
     unknown = np.full(len(work), np.nan)
-    return Recording(problem, "see", {}, {}, pace * work, work, quality, unknown, (20 * pace, 20.0), True)
+    return Recording(
+        problem, "see", {}, {}, pace * work, work, quality, unknown, (20 * pace, 20.0), True
+    )
 
 
 def library(paces, best=0.9, machine="lab"):
@@ -43,7 +45,9 @@ def test_nothing_changed_is_the_same_whatever_is_left_out():
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.2, 5.0), st.floats(0.5, 1.0))
 def test_a_module_that_is_slower_and_worse_is_told_by_how_much(slower, worse):
-    found = shift(library([1.0, 1.3, 0.8]), library(slower * np.array([1.0, 1.3, 0.8]), 0.9 * worse))
+    found = shift(
+        library([1.0, 1.3, 0.8]), library(slower * np.array([1.0, 1.3, 0.8]), 0.9 * worse)
+    )
     assert found.slower == pytest.approx(slower)
     assert found.quality == pytest.approx(worse)
 
@@ -66,9 +70,7 @@ def test_a_module_does_not_answer_for_what_feeds_it():
 
     def fed(qualities):
         runs = [
-            replace(
-                recording(f"p{index}", 1.0, quality), inputs={"sensor": quality}
-            )
+            replace(recording(f"p{index}", 1.0, quality), inputs={"sensor": quality})
             for index in range(6)
             for quality in qualities
         ]
@@ -86,5 +88,7 @@ def test_compiled_programs_tell_their_shift_without_problems():
 
 
 def test_a_library_without_the_module_is_refused():
-    with pytest.raises(AnytimeError, match=r"the library after has no profile of 'see'; it has none"):
+    with pytest.raises(
+        AnytimeError, match=r"the library after has no profile of 'see'; it has none"
+    ):
         shifts_of_libraries(PROGRAM, library([1.0]), ProfileLibrary())
