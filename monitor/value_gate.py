@@ -109,6 +109,11 @@ class Foresight:
         return float((value - cost).max())
 
     @cached_property
+    def unchanged(self) -> dict[int | None, float]:
+        """The worth of before, with each group of missions left out and with none."""
+        return {out: self.worth({}, out) for out in (None, *range(GROUPS))}
+
+    @cached_property
     def _divisions(self) -> tuple[Floats, Floats]:
         """Every time of sensing with every division of the rest, [C, n], and the quality of each
         over that of unlimited time after sensing, [C]; before any shift.
@@ -172,11 +177,11 @@ def gate(foresight: Foresight, shifts: Shifts, tolerance: float = 0.0) -> Gate:
     """
     losses = np.array(
         [
-            foresight.worth({}, out) - foresight.worth(shifts.without(out), out)
+            foresight.unchanged[out] - foresight.worth(shifts.without(out), out)
             for out in range(GROUPS)
         ]
     )
-    before, after = foresight.worth({}), foresight.worth(shifts.all)
+    before, after = foresight.unchanged[None], foresight.worth(shifts.all)
     error = float(losses.std()) * (GROUPS - 1) ** 0.5
     reach = float(stats.t.ppf(0.975, GROUPS - 1)) * error + LEAST * foresight.mission.value.worth
     loss = before - after

@@ -14,6 +14,7 @@ from experiments import shipped
 from experiments.benchmarks.figures import Benchmark
 from experiments.benchmarks.monitor_gate import gate_figures
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_traces import trace_figures
 from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
@@ -92,6 +93,8 @@ def measure(
     of_gate, gate_settings = gate_figures(seed, QUICK_TRIALS if quick else TRIALS, progress)
     figures |= of_gate
     settings |= gate_settings
+    progress("a knob")
+    figures |= knob_figures(seed)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()
