@@ -52,7 +52,7 @@ class Reading:
         return made
 
     def chosen(self, alternatives: Sequence[Call | Join]) -> Call | Join:
-        """The best of several results by their estimates; the first there is, where one has none."""
+        """The best of several results by their estimates; the first that is there without them."""
         made = (call for each in alternatives for call in makers(each))
         rule = Best(all(call.module.estimate is not None for call in made))
         *rest, best = alternatives

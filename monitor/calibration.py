@@ -54,7 +54,7 @@ def live_steadily(
     longest = float(contracts.shares[:, 1:].sum(axis=1).max())
     endless = _patient(mission)
     lived: list[Steady] = []
-    for shares in _constants(program, chosen, longest):
+    for shares in _constants(program, chosen.tolist(), longest):
         division = dict(zip(program.labels, shares, strict=True))
         policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
         routes: list[float] = []
@@ -185,7 +185,7 @@ def _patient(mission: Mission) -> Mission:
     """The mission as it would go on after its deadline, up to `PATIENCE` times as long."""
     value = mission.value
     until = value.deadline if np.isfinite(value.deadline) else 8 * value.seconds
-    return replace(mission, value=Value("hard", value.worth, PATIENCE * until))
+    return replace(mission, value=Value("hard", value.worth, PATIENCE * until), news=None)
 
 
 def _lived(sensing: float, route: float, report: Report) -> Lived:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from anytime.errors import AnytimeError
 from anytime.files import LARGEST
 from monitor.endings import Ending
 from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLine, RegretLine
-from monitor.missions import Energy, Value
+from monitor.missions import Energy, News, Value
 
 
 def read_log(path: Path | str) -> Log:
@@ -89,6 +90,9 @@ def _check_mission(line: MissionLine, where: str) -> None:
         raise AnytimeError(f"{where}: has schema {line.schema!r}, needed is {SCHEMA!r}")
     try:
         Value(**line.value)  # type: ignore[arg-type]
+        if line.news is not None:
+            told = dict(line.news)
+            News(told.pop("at", math.nan), Value(**told))  # type: ignore[arg-type]
         Energy(**line.energy)
     except (TypeError, ValueError) as error:
         raise AnytimeError(f"{where}: {error}") from None

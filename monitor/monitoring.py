@@ -112,14 +112,10 @@ class _Life:
             if situation.ending is Ending.REACHED:
                 self.robot.work(self.mission.job)
                 self.job = self.mission.job
-                return (
-                    Ending.REACHED
-                    if self.time() <= self.mission.value.deadline
-                    else Ending.DEADLINE
-                )
+                return Ending.REACHED if self.time() <= self.deadline() else Ending.DEADLINE
             if situation.ending is not None:
                 return situation.ending
-            if self.time() >= self.mission.value.deadline:
+            if self.time() >= self.deadline():
                 return Ending.DEADLINE
             if standing and self.failures.no_plan_in_sight:
                 return Ending.MODULES_FAILED
@@ -161,6 +157,10 @@ class _Life:
         self.failures.note(f"the policy {self.monitor.name} failed: {reason}")
         before = state.contract or (self.frames[-1].decision if self.frames else None)
         return before or last_resort(self.monitor.program, self.mission)
+
+    def deadline(self) -> float:
+        """The time from which on the task is worth nothing, as far as it is known now."""
+        return self.mission.known(self.time()).value.deadline
 
     def time(self) -> float:
         """Seconds since the task was presented."""
@@ -347,7 +347,7 @@ class _Life:
             ending=ending,
             promised=self.promised,
             net=self.mission.net(reached, seconds, energy),
-            earned=float(self.mission.value(seconds)) if reached else 0.0,
+            earned=float(self.mission.known(seconds).value(seconds)) if reached else 0.0,
             seconds=seconds,
             energy=energy,
             job=self.job,

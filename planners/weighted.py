@@ -1,4 +1,4 @@
-"""Weighted A* with its weight as a knob: a longer way sooner, or a shorter one later [Pohl 1970]."""
+"""Weighted A* with its weight as a knob: a longer way sooner, a shorter one later [Pohl 1970]."""
 
 from __future__ import annotations
 

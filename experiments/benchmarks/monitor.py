@@ -16,6 +16,7 @@ from experiments.benchmarks.monitor_gate import gate_figures
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
 from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
+from experiments.benchmarks.monitor_news import news_figures
 from experiments.benchmarks.monitor_traces import trace_figures
 from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
 from monitor.certainty import resolve
@@ -45,6 +46,7 @@ TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
 TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
+NEWS = 60  # missions in which a deadline becomes known
 
 
 def measure(
@@ -95,6 +97,8 @@ def measure(
     settings |= gate_settings
     progress("a knob")
     figures |= knob_figures(seed)
+    progress("a deadline that becomes known on the way")
+    figures |= news_figures(seed, NEWS if not quick else QUICK_TRIALS)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()

@@ -109,4 +109,4 @@ def _lived_loss(grid: GridMission, briefing: Briefing, library: ProfileLibrary) 
     for each in (briefing, slow):
         monitor = each.monitor("expected")
         nets.append(np.array([each.live(monitor, seed).net for seed in range(LIVED)]))
-    return bootstrap(nets, lambda before, after: before - after).under("gate.lived")
+    return {**bootstrap(nets, lambda before, after: before - after).under("gate.lived")}

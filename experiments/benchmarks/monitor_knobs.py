@@ -1,4 +1,4 @@
-"""What a knob is worth: weighted A* with its weight set for each budget, against each weight kept."""
+"""What a knob is worth: weighted A* with its weight set for each budget, or kept."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from monitor.forking import forked
 from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
 from monitor.monitoring import Listener, Monitor
-from monitor.policies import Paper, Policy, constant
+from monitor.policies import Informed, Paper, Policy, constant
 from monitor.reports import Frame, Report
 from monitor.rhythms import Rhythm
 from monitor.robots.faulty import FaultyRobot, faulty_program
@@ -88,6 +88,11 @@ class Briefing:
 
     def _policy(self, name: str) -> Policy:
         mission = self.grid.mission
+        news = mission.news
+        if news is not None:  # what comes is not foreseen, but what to do then is prepared
+            parts = (mission.known(time) for time in (0.0, news.at))
+            grids = (replace(self.grid, mission=part) for part in parts)
+            return Informed(news.at, *(replace(self, grid=grid)._policy(name) for grid in grids))
         if name == "paper":
             return Paper(mission, self.contracts, self.rhythm)
         if name == "fixed":

@@ -105,8 +105,8 @@ def run(options: argparse.Namespace) -> Answer:
         raise AnytimeError(f"{options.faults}: no such file of faults")
     if options.regret and (options.regret < 2 or options.faults or options.clock == "wall"):
         raise AnytimeError(
-            f"--regret {options.regret}: it takes 2 or more, and a mission that can be lived again: "
-            "without --faults, on the work clock"
+            f"--regret {options.regret}: it takes 2 or more, and a mission that can be lived "
+            "again: without --faults, on the work clock"
         )
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
