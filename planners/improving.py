@@ -246,7 +246,8 @@ def _replace(run, first, last, piece):
     elif grown < 0:
         for place in range(last + 1, count):
             run.path[place + grown] = run.path[place]
-    run.path[first : first + piece.size] = piece
+    for place in range(piece.size):
+        run.path[first + place] = piece[place]
     run.state[COUNT] = count + grown
 
 
