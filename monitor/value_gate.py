@@ -144,7 +144,7 @@ class Foresight:
         two of them would else be taken for what seeing is worth.
         """
         kept = [_without(steady, out) for steady in self.lived]
-        lived = rhythm_from([steady for steady in kept if steady.reports])
+        lived = rhythm_from(kept)
         if lived is None:
             raise AnytimeError(
                 f"no mission of {self.mission.name!r} reached its goal, so none can be foreseen"
@@ -191,16 +191,11 @@ def gate(foresight: Foresight, shifts: Shifts, tolerance: float = 0.0) -> Gate:
 
 
 def _without(steady: Steady, out: int | None) -> Steady:
-    pairs = [
-        (route, report)
-        for route, report in zip(steady.routes, steady.reports, strict=True)
-        if out is None or report.seed % GROUPS != out
-    ]
-    return replace(
-        steady,
-        routes=tuple(route for route, _ in pairs),
-        reports=tuple(report for _, report in pairs),
-    )
+    """Without a group of the missions lived, those of every level in turn."""
+    if out is None:
+        return steady
+    kept = [place for place in range(len(steady.lived)) if place % GROUPS != out]
+    return replace(steady, lived=tuple(steady.lived[place] for place in kept), legs=())
 
 
 def _thinned(rows: Floats, most: int) -> Floats:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from planners.frontier import least_way, next_base, pop, sift_up
 from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN
 
-FRONTIER = "f8c084d5e1a0"
+FRONTIER = "84699215c6e2"
 
 FOUND = 0
 SIDE, MOST = 8, 32

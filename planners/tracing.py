@@ -23,7 +23,7 @@ from planners.blocks import (
 from planners.frontier import least_way, step_cost
 from planners.search import DIAGONAL, SPAN
 
-FRONTIER = "f8c084d5e1a0"
+FRONTIER = "84699215c6e2"
 
 TAUT = 2
 """How often pins are drawn taut."""

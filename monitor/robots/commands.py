@@ -89,6 +89,7 @@ def run(options: argparse.Namespace) -> Answer:
     from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.faulty import kinds_of
     from monitor.robots.grid_missions import read_mission
+    from monitor.robots.lessons import user_memory
     from monitor.robots.nao_scenes import is_scene
 
     if is_scene(options.mission):
@@ -117,7 +118,7 @@ def run(options: argparse.Namespace) -> Answer:
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
     with progress("calibrating"):
-        briefing = brief(grid, library)
+        briefing = brief(grid, library, memory=user_memory())
         monitor = briefing.monitor(options.policy)
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
     faults = None
@@ -154,10 +155,13 @@ def compare_sides(options: argparse.Namespace) -> Answer:
     """What a change costs, with its 95 % interval; exit code 1 if a loss is shown."""
     from monitor.robots.comparing import compare
     from monitor.robots.grid_missions import read_mission
+    from monitor.robots.lessons import user_memory
 
     grid = read_mission(options.mission)
     with progress("living the mission"):
-        found = compare(options.before, options.after, grid, options.tolerance)
+        found = compare(
+            options.before, options.after, grid, options.tolerance, memory=user_memory()
+        )
     figures = {
         "before": found.before,
         "after": found.after,

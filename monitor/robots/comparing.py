@@ -13,6 +13,7 @@ from compiler import CompiledProgram, load
 from monitor.policies import Expected
 from monitor.robots.briefing import Briefing, Effort, brief, brief_with, effort_for
 from monitor.robots.grid_missions import GridMission
+from monitor.robots.lessons import NO_MEMORY, Memory
 from monitor.robots.navigation import navigate
 from monitor.shifts import GROUPS, shifts_of_libraries, shifts_of_schedules
 from monitor.value_gate import Foresight, Gate, gate
@@ -20,11 +21,17 @@ from planners.navigation import find_path
 from sensing.vision import see
 
 
-def compare(before: Path, after: Path, grid: GridMission, tolerance: float = 0.0) -> Gate:
+def compare(
+    before: Path,
+    after: Path,
+    grid: GridMission,
+    tolerance: float = 0.0,
+    memory: Memory = NO_MEMORY,
+) -> Gate:
     """What a change costs in the value of a mission.
 
     before, after: folders of profiles, or files that `anytime compile` wrote. tolerance: the loss
-    of net value that is put up with.
+    of net value that is put up with. memory: where what the missions lived teach is kept.
     Raises AnytimeError for two of different kinds, and for programs of other modules.
     """
     grid = replace(grid, mission=grid.mission.known(0.0))  # judged as it is presented
@@ -36,10 +43,10 @@ def compare(before: Path, after: Path, grid: GridMission, tolerance: float = 0.0
     if before.is_dir():
         libraries = ProfileLibrary(before), ProfileLibrary(after)
         shifts = shifts_of_libraries(navigate, *libraries)  # refuses before anything is lived
-        return gate(foreseen(brief(grid, libraries[0], effort(grid))), shifts, tolerance)
+        return gate(foreseen(brief(grid, libraries[0], effort(grid), memory)), shifts, tolerance)
     old, new = (_schedule(path, grid) for path in (before, after))
     shifts = shifts_of_schedules(old, new)
-    return gate(foreseen(brief_with(old, grid, effort(grid))), shifts, tolerance)
+    return gate(foreseen(brief_with(old, grid, effort(grid), memory)), shifts, tolerance)
 
 
 def foreseen(briefing: Briefing) -> Foresight:

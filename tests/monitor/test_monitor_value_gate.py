@@ -10,11 +10,10 @@ from compiler import compile
 from experiments import shipped
 from monitor import Energy, Mission, Value
 from monitor.calibration import Steady
-from monitor.endings import Ending
-from monitor.reports import Frame, Moment, Report
+from monitor.rhythms import Lived
 from monitor.robots.navigation import navigate
 from monitor.shifts import GROUPS, Shift, Shifts
-from monitor.states import Decision, Situation
+from monitor.states import Situation
 from monitor.value_gate import Foresight, gate
 
 MISSION = Mission(Value("linear", 100.0, 90.0), Energy(0.2, 0.08, 0.03), job=1.0, name="ward")
@@ -24,13 +23,7 @@ ROUTE, FRAMES = 100.0, 10
 def lived(sensing, seed):
     """A mission that walks less the longer it looks."""
     walked = ROUTE * (1.2 + 0.8 * np.exp(-sensing / 2) + 0.05 * np.sin(seed))
-    story = {"length": walked / FRAMES, "planned": 0.9 * walked / FRAMES}
-    decision = Decision({"see": sensing, "find_path": 0.3}, 5.0)
-    frames = tuple(
-        Frame(index, 0, 1, index == 0, (Moment(0, "frame", decision),), (), 1, 1, False, story)
-        for index in range(FRAMES)
-    )
-    return Report("ward", "constant", seed, Ending.REACHED, 0, 0, 0, 0, 0, 0, frames)
+    return Lived(sensing, ROUTE, walked, 0.9 * walked, FRAMES, 1, 0.8)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +31,7 @@ def foresight():
     program = compile(navigate, shipped.profiles())
     seeds = range(2 * GROUPS)
     steady = tuple(
-        Steady((time, 0.3), (ROUTE,) * len(seeds), tuple(lived(time, seed) for seed in seeds))
+        Steady((time, 0.3), tuple(lived(time, seed) for seed in seeds), ())
         for time in (0.5, 1.5, 2.5, 4.0, 6.0)
     )
     situation = Situation(0.0, ROUTE, 0.0)
