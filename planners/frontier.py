@@ -15,6 +15,13 @@ from numba import njit
 from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
 
 
+ONE, SIDE_BITS = np.uint64(1), np.uint64(8)
+NOT_FIRST = ~np.uint64(0x0101010101010101)
+NOT_LAST = ~np.uint64(0x8080808080808080)
+"""In a word whose bit 8·row + column is a cell of a block: a step to the right and one down, all
+cells but those of the first column, and but those of the last."""
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def octile(rows, columns):
     """Return the length of the shortest 8-connected way over a free rectangle."""
@@ -148,3 +155,18 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
                 if step > 0 and label[there] - step > best_label:
                     best, best_label = there, label[there] - step
         node = best
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wave(reached, mask, diagonals):
+    """The cells of a region that one more step leads to, with those already reached."""
+    east, west = (mask >> ONE) & NOT_LAST, (mask << ONE) & NOT_FIRST
+    south, north = mask >> SIDE_BITS, mask << SIDE_BITS
+    more = ((reached << ONE) & NOT_FIRST) | ((reached >> ONE) & NOT_LAST)
+    more |= (reached << SIDE_BITS) | (reached >> SIDE_BITS)
+    if diagonals:  # both orthogonal cells are free, so corners are not cut
+        more |= ((reached & east & south) << (SIDE_BITS + ONE)) & NOT_FIRST
+        more |= ((reached & west & south) << (SIDE_BITS - ONE)) & NOT_LAST
+        more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
+        more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
+    return (more & mask) | reached

@@ -12,18 +12,14 @@ from planners.blocks import (
     FIRST_ROW,
     LAST_BIT,
     LAST_ROW,
-    MOST,
-    NOT_FIRST,
-    NOT_LAST,
     ONE,
     SIDE,
-    SIDE_BITS,
     ZERO,
 )
-from planners.frontier import least_way, step_cost
+from planners.frontier import least_way, step_cost, wave
 from planners.search import DIAGONAL, SPAN
 
-FRONTIER = "f8c084d5e1a0"
+FRONTIER = "a9161c50d1b3"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -48,13 +44,15 @@ def pins_of(columns, goal, diagonals, regions, run):
         pins[place] = run.pin[region]
         way[place] = region
         region = run.parent[region]
-    across, touched = (columns + SIDE - 1) // SIDE, 0
+    across, blocks, touched = (columns + SIDE - 1) // SIDE, regions.count.size, 0
     for turn in range(TAUT):
         for step in range(1, count - 1):
-            place = step if turn % 2 == 0 else count - 1 - step
-            here, block = way[place], way[place] // MOST
-            side = way[place - 1] // MOST - block
-            before, after = np.int64(pins[place - 1]), np.int64(pins[place + 1])
+            place = step if turn % 2 == 1 else count - 1 - step
+            here, block = way[place], way[place] % blocks
+            side = way[place - 1] % blocks - block
+            # At first from where the way bends, which may lie several regions back.
+            before = np.int64(pins[place - 1] if turn > 0 else run.bend[here])
+            after = np.int64(pins[place + 1])
             first = block // across * SIDE * columns + block % across * SIDE
             mask, other = regions.mask[here], regions.mask[way[place - 1]]
             if side == -across:
@@ -115,21 +113,6 @@ def _line(cost, wall, dearest, columns, start, goal, diagonals, straight_first, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _wave(reached, mask, diagonals):
-    """The cells of a region that one more step leads to, with those already reached."""
-    east, west = (mask >> ONE) & NOT_LAST, (mask << ONE) & NOT_FIRST
-    south, north = mask >> SIDE_BITS, mask << SIDE_BITS
-    more = ((reached << ONE) & NOT_FIRST) | ((reached >> ONE) & NOT_LAST)
-    more |= (reached << SIDE_BITS) | (reached >> SIDE_BITS)
-    if diagonals:  # both orthogonal cells are free, so corners are not cut
-        more |= ((reached & east & south) << (SIDE_BITS + ONE)) & NOT_FIRST
-        more |= ((reached & west & south) << (SIDE_BITS - ONE)) & NOT_LAST
-        more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
-        more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
-    return (more & mask) | reached
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _within(mask, start, goal, diagonals, steps):
     """A way with the fewest steps between two cells of a region, straight ones where it can.
 
@@ -139,7 +122,7 @@ def _within(mask, start, goal, diagonals, steps):
     waves[0] = ONE << np.uint64(start)
     count, target = 0, ONE << np.uint64(goal)
     while waves[count] & target == ZERO:
-        waves[count + 1] = _wave(waves[count], mask, diagonals)
+        waves[count + 1] = wave(waves[count], mask, diagonals)
         count += 1
     here = goal
     for step in range(count):
@@ -209,7 +192,7 @@ def connect(cost, wall, dearest, columns, pins, way, regions, diagonals, path):
             here = reached
             continue
         goal = np.int64(pins[here + 1])
-        block = way[here] // MOST
+        block = way[here] % regions.count.size
         top, left = block // across * SIDE, block % across * SIDE
         # The cell of this region from which the next is entered; the last pin lies in this one.
         row = min(max(goal // columns, top), top + SIDE - 1)
