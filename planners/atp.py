@@ -32,11 +32,12 @@ GRAIN = 1000
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
-_REGION_PERCENT = 110  # weight of the search over regions
+_REGION_PERCENT = 104  # weight of the search over regions between ends 128 cells apart …
+_PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
 _FIRST, _SCALES = 1.08, (1.015, 0.995)
 """By what the norm of independent obstacles is multiplied, search by search."""
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
-_WINDOW_SHARE = 3  # … which together take at most so many times the work of the coarse way
+_WINDOW_SHARE = 4  # … which together take at most so many times the work of the coarse way
 _PATIENCE = 12  # expansions per cell of distance after which a weight was too small
 
 
@@ -192,12 +193,14 @@ class _Query:
         grid, run = self.grid, _borrow_regions(self.grid.shape)
         cost, wall, columns = self._map
         soft = (cost, wall, grid.dearest, columns)
+        far = max(abs(self.down), abs(self.across))
+        percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         try:
             work = blocks.begin_regions(*soft, self.start, self.goal, grid.regions, run)
             found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
                 found, taken = blocks.search_regions(
-                    *soft, self.goal, self.diagonals, _REGION_PERCENT, grid.regions, run,
+                    *soft, self.goal, self.diagonals, percent, grid.regions, run,
                     GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
                 work += taken

@@ -17,15 +17,16 @@ from planners.frontier import (
     NOT_LAST,
     ONE,
     SIDE_BITS,
+    detour,
+    flood,
     least_way,
     next_base,
     pop,
     sift_up,
-    wave,
 )
 from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-FRONTIER = "a9161c50d1b3"
+FRONTIER = "d40d526955c3"
 
 FOUND = 0
 SIDE, MOST = 8, 32
@@ -262,17 +263,6 @@ def _in_sight(door, columns, block_row, block_column, pin, bend, row, column):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _detour(waves, count, start, goal, diagonals):
-    """How many steps more a way within a region has, by its waves, than over a free block."""
-    down, along = abs(start // SIDE - goal // SIDE), abs(start % SIDE - goal % SIDE)
-    least = max(down, along) if diagonals else down + along
-    steps, bit = least, ONE << np.uint64(goal)
-    while steps < count and waves[steps] & bit == ZERO:
-        steps += 1
-    return steps - least
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regions, run, budget):
     """Go on with the search; return (FOUND or NO_PATH or OUT_OF_BUDGET, work in 1/256 expansions).
 
@@ -304,13 +294,10 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
         pin_row, pin_column = pin // columns, pin % columns
         bend_row, bend_column = bend // columns, bend % columns
         bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
-        inside, reached, mask = np.int64(0), 0, regions.mask[here]
+        inside, reached, mask = np.int64(0), np.int64(0), regions.mask[here]
         if mask != ALL:  # what stands in the block may be in the way
             inside = (pin_row - block_row * SIDE) * SIDE + pin_column - block_column * SIDE
-            waves[0] = ONE << np.uint64(inside)
-            while waves[reached] != mask:
-                waves[reached + 1] = wave(waves[reached], mask, diagonals)
-                reached += 1
+            reached = flood(mask, inside, diagonals, waves)
             work += reached * TOUCHED
         for side in range(4):
             mine = (np.int64(edge[here]) >> (SIDE * side)) & 0xFF
@@ -350,8 +337,19 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                         column = place
                     else:
                         row = place
-                    if turn == 1 or bend == pin or _in_sight(
-                        np.int64(doors[here]), columns, block_row, block_column, pin, bend, row, column
+                    if (
+                        turn == 1
+                        or bend == pin
+                        or _in_sight(
+                            np.int64(doors[here]),
+                            columns,
+                            block_row,
+                            block_column,
+                            pin,
+                            bend,
+                            row,
+                            column,
+                        )
                     ):
                         break
                     from_row, from_column, from_g, from_cell = pin_row, pin_column, pin_g, pin
@@ -361,13 +359,13 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                 if reached > 0:
                     start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
                     exit = start + (place - first) * stride
-                if reached > 0 and _detour(waves, reached, inside, exit, diagonals) > 0:
+                if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
                     # The way goes round something within the block, and may bend anywhere.
                     least, best = SPAN, np.int64(0)
                     for place in range(SIDE):
                         if (join >> place) & 1 == 0:
                             continue
-                        more = _detour(waves, reached, inside, start + place * stride, diagonals)
+                        more = detour(waves, reached, inside, start + place * stride, diagonals)
                         row = line if side < 2 else first + place
                         column = first + place if side < 2 else line
                         g = pin_g + STRAIGHT * more

@@ -14,7 +14,6 @@ from numba import njit
 
 from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
 
-
 ONE, SIDE_BITS = np.uint64(1), np.uint64(8)
 NOT_FIRST = ~np.uint64(0x0101010101010101)
 NOT_LAST = ~np.uint64(0x8080808080808080)
@@ -170,3 +169,24 @@ def wave(reached, mask, diagonals):
         more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
         more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
     return (more & mask) | reached
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flood(mask, start, diagonals, waves):
+    """Write the waves from a cell through a region of a block, and return how many steps they go."""
+    waves[0], count = ONE << np.uint64(start), 0
+    while waves[count] != mask:
+        waves[count + 1] = wave(waves[count], mask, diagonals)
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def detour(waves, count, start, goal, diagonals):
+    """How many steps more the way between two cells of a flooded region has than on a free floor."""
+    down, along = abs((start >> 3) - (goal >> 3)), abs((start & 7) - (goal & 7))
+    least = max(down, along) if diagonals else down + along
+    steps, bit = least, ONE << np.uint64(goal)
+    while steps < count and waves[steps] & bit == np.uint64(0):
+        steps += 1
+    return steps - least

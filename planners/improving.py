@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from planners.frontier import next_base, path_to, step_cost
 from planners.search import DIAGONAL, LAST, OUT_OF_BUDGET, SPAN, STRAIGHT, WALL
 
-FRONTIER = "a9161c50d1b3"
+FRONTIER = "d40d526955c3"
 
 DONE = 0
 BUCKETS = 1 << 13

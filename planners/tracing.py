@@ -8,18 +8,18 @@ import numpy as np
 from numba import njit
 
 from planners.blocks import (
+    ALL,
     FIRST_COLUMN,
     FIRST_ROW,
     LAST_BIT,
     LAST_ROW,
-    ONE,
     SIDE,
     ZERO,
 )
-from planners.frontier import least_way, step_cost, wave
-from planners.search import DIAGONAL, SPAN
+from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
+from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-FRONTIER = "a9161c50d1b3"
+FRONTIER = "d40d526955c3"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -45,13 +45,16 @@ def pins_of(columns, goal, diagonals, regions, run):
         way[place] = region
         region = run.parent[region]
     across, blocks, touched = (columns + SIDE - 1) // SIDE, regions.count.size, 0
+    coming, going = np.empty(SIDE * SIDE + 1, np.uint64), np.empty(SIDE * SIDE + 1, np.uint64)
+    from_cell = to_cell = np.int64(0)
     for turn in range(TAUT):
         for step in range(1, count - 1):
             place = step if turn % 2 == 1 else count - 1 - step
             here, block = way[place], way[place] % blocks
             side = way[place - 1] % blocks - block
             # At first from where the way bends, which may lie several regions back.
-            before = np.int64(pins[place - 1] if turn > 0 else run.bend[here])
+            bent = turn > 0 or run.bend[here] == run.pin[here]
+            before = np.int64(pins[place - 1] if bent else run.bend[here])
             after = np.int64(pins[place + 1])
             first = block // across * SIDE * columns + block % across * SIDE
             mask, other = regions.mask[here], regions.mask[way[place - 1]]
@@ -65,6 +68,20 @@ def pins_of(columns, goal, diagonals, regions, run):
             else:
                 join, stride = (mask >> LAST_BIT) & FIRST_COLUMN & other, columns
                 first += SIDE - 1
+            # What stands within the two blocks may make one cell a longer way than another.
+            top, left = block // across * SIDE, block % across * SIDE
+            came = went = np.int64(0)
+            if bent and other != ALL:
+                r = before // columns - way[place - 1] % blocks // across * SIDE
+                c = before % columns - way[place - 1] % blocks % across * SIDE
+                from_cell = r * SIDE + c
+                came = flood(other, from_cell, diagonals, coming)
+            if mask != ALL:
+                r = min(max(after // columns - top, 0), SIDE - 1)
+                c = min(max(after % columns - left, 0), SIDE - 1)
+                to_cell = r * SIDE + c
+                went = flood(mask, to_cell, diagonals, going)
+            touched += came + went
             least = SPAN
             for along in range(SIDE):
                 bit = along if stride == 1 else along * SIDE
@@ -75,6 +92,14 @@ def pins_of(columns, goal, diagonals, regions, run):
                 row, column = cell // columns, cell % columns
                 there = least_way(row - before // columns, column - before % columns, diagonals)
                 there += least_way(row - after // columns, column - after % columns, diagonals)
+                inside = (row - top) * SIDE + column - left
+                if went > 0:
+                    there += STRAIGHT * detour(going, went, to_cell, inside, diagonals)
+                if came > 0:
+                    # The cell beside it, in the block before.
+                    beside = inside + (56 if side == -across else -56 if side == across
+                                       else 7 if side == -1 else -7)  # fmt: skip
+                    there += STRAIGHT * detour(coming, came, from_cell, beside, diagonals)
                 if there < least:
                     least = there
                     pins[place] = cell
