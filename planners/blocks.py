@@ -26,7 +26,7 @@ from planners.frontier import (
 )
 from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-FRONTIER = "d40d526955c3"
+FRONTIER = "ebad7d52fa6d"
 
 FOUND = 0
 SIDE, MOST = 8, 32
@@ -242,24 +242,18 @@ def crossing(ahead, along, goal_ahead, goal_along, line):
     diagonal towards the goal would."""
     to_line, to_goal, aside = line - ahead, goal_ahead - ahead, goal_along - along
     if to_line * to_goal > 0 and abs(to_line) <= abs(to_goal):
-        return along + (2 * aside * to_line + to_goal) // (2 * to_goal)
+        return along + int(np.floor(aside * to_line / to_goal + 0.5))
     return along + min(max(aside, -abs(to_line)), abs(to_line))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _in_sight(door, columns, block_row, block_column, pin, bend, row, column):
-    """Whether the straight way from `bend` to a cell leads through the door of the block's region
-    between them, which has its pin in it."""
-    if door >> SIDE < 2:
-        line, first, ahead, along = pin // columns, block_column, bend // columns, bend % columns
-        to_ahead, to_along = row, column
-    else:
-        line, first, ahead, along = pin % columns, block_row, bend % columns, bend // columns
-        to_ahead, to_along = column, row
+def _in_sight(cells, first, line, ahead, along, to_ahead, to_along):
+    """Whether the straight way between two places crosses a line `ahead` in one of the cells, bits
+    from `first` on."""
     if (line - ahead) * (to_ahead - line) < 0 or to_ahead == ahead:
         return False
-    place = crossing(ahead, along, to_ahead, to_along, line) - first * SIDE
-    return 0 <= place < SIDE and (door >> place) & 1 != 0
+    place = crossing(ahead, along, to_ahead, to_along, line) - first
+    return 0 <= place < SIDE and (cells >> place) & 1 != 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -276,6 +270,7 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
     pins, bends, doors, parents = run.pin, run.bend, run.door, run.parent
     base, size, last, work = run.clock[0], run.state[0], run.state[2], 0
     goal_row, goal_column = goal // columns, goal % columns
+    per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
     waves = np.empty(SIDE * SIDE + 1, np.uint64)
     while size > 0:
         if work >= budget:
@@ -287,16 +282,19 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
         if here == last:
             run.state[0] = size
             return FOUND, work
-        block, pin, bend = here % count, np.int64(pins[here]), np.int64(bends[here])
-        block_row = block // across
+        # Divisions of integers would take most of the time.
+        block = here - int((here + 0.5) * per_block) * count
+        block_row = int((block + 0.5) * per_across)
         block_column = block - block_row * across
-        pin_g = base - label[here]
-        pin_row, pin_column = pin // columns, pin % columns
-        bend_row, bend_column = bend // columns, bend % columns
+        top, left = block_row * SIDE, block_column * SIDE
+        pin, bend, pin_g = np.int64(pins[here]), np.int64(bends[here]), base - label[here]
+        pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
+        pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
+        door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
         bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
         inside, reached, mask = np.int64(0), np.int64(0), regions.mask[here]
         if mask != ALL:  # what stands in the block may be in the way
-            inside = (pin_row - block_row * SIDE) * SIDE + pin_column - block_column * SIDE
+            inside = (pin_row - top) * SIDE + pin_column - left
             reached = flood(mask, inside, diagonals, waves)
             work += reached * TOUCHED
         for side in range(4):
@@ -304,18 +302,18 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
             if mine == 0:
                 continue
             if side == 0:
-                there, line, outside = block - across, block_row * SIDE - 1, block_row == 0
+                there, line, outside = block - across, top - 1, top == 0
             elif side == 1:
-                there, line = block + across, (block_row + 1) * SIDE
+                there, line = block + across, top + SIDE
                 outside = block_row + 1 == high
             elif side == 2:
-                there, line, outside = block - 1, block_column * SIDE - 1, block_column == 0
+                there, line, outside = block - 1, left - 1, left == 0
             else:
-                there, line = block + 1, (block_column + 1) * SIDE
+                there, line = block + 1, left + SIDE
                 outside = block_column + 1 == across
             if outside:
                 continue
-            first = (block_column if side < 2 else block_row) * SIDE
+            first = left if side < 2 else top
             work += know(cost, wall, dearest, columns, there, regions)
             for number in range(np.int64(regions.count[there])):
                 region = number * count + there
@@ -337,20 +335,13 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                         column = place
                     else:
                         row = place
-                    if (
-                        turn == 1
-                        or bend == pin
-                        or _in_sight(
-                            np.int64(doors[here]),
-                            columns,
-                            block_row,
-                            block_column,
-                            pin,
-                            bend,
-                            row,
-                            column,
-                        )
-                    ):
+                    if turn == 1 or bend == pin:
+                        break
+                    if upright:
+                        seen = _in_sight(door, left, pin_row, bend_row, bend_column, row, column)
+                    else:
+                        seen = _in_sight(door, top, pin_column, bend_column, bend_row, column, row)
+                    if seen:
                         break
                     from_row, from_column, from_g, from_cell = pin_row, pin_column, pin_g, pin
                 g = from_g + least_way(row - from_row, column - from_column, diagonals)
@@ -372,10 +363,11 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                         g += least_way(row - pin_row, column - pin_column, diagonals)
                         h = least_way(row - goal_row, column - goal_column, diagonals)
                         if g + h < least:
-                            least, best = g + h, row * columns + column
-                    row, column = best // columns, best % columns
+                            least, best = g + h, first + place
+                    row = line if side < 2 else best
+                    column = best if side < 2 else line
                     h = least_way(row - goal_row, column - goal_column, diagonals)
-                    g, from_cell = least - h, best
+                    g, from_cell = least - h, row * columns + column
                 f = g + h * percent // 100
                 if known and f >= key[slot[region]]:
                     continue

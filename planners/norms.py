@@ -29,7 +29,7 @@ def least_norm(diagonals: bool) -> NDArray[np.int64]:
 
 
 def expected_norm(density: float, scale: float, diagonals: bool) -> NDArray[np.int64]:
-    """`scale` times what a way costs on floors of a density, as int64 [6], by `improving.estimated`.
+    """`scale` times what a way costs on floors of a density, as `improving.estimated` takes it.
 
     Three planes touch the measured values in four directions; the norm is convex, so the greatest
     of them lies between. Without diagonals the direction matters little.

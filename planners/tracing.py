@@ -19,7 +19,7 @@ from planners.blocks import (
 from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-FRONTIER = "d40d526955c3"
+FRONTIER = "ebad7d52fa6d"
 
 TAUT = 2
 """How often pins are drawn taut."""

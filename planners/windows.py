@@ -26,7 +26,7 @@ from planners.search import (
     WALL,
 )
 
-FRONTIER = "d40d526955c3"
+FRONTIER = "ebad7d52fa6d"
 
 # numba compiles a callee once more for every literal argument; these are no literals.
 YES, ZERO, CHEAPEST, EXACT = np.bool_(True), np.int64(0), np.int64(1), np.int64(100)
