@@ -196,7 +196,7 @@ class _Query:
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         try:
-            work = blocks.begin_regions(*soft, self.start, self.goal, grid.regions, run)
+            work = blocks.begin_regions(*soft, self.start, self.goal, percent, grid.regions, run)
             found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
                 found, taken = blocks.search_regions(

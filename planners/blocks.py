@@ -21,16 +21,19 @@ from planners.frontier import (
     flood,
     least_way,
     next_base,
-    pop,
-    sift_up,
 )
-from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
+from planners.search import BUCKET_SHIFT, DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
 FRONTIER = "ebad7d52fa6d"
 
 FOUND = 0
 SIDE, MOST = 8, 32
 UNKNOWN = 255
+BUCKETS, NOTHING = 1 << 13, -1
+OPENED, LAST_REGION, SHIFT, CURRENT, LOW, HIGH, FRESH, UNUSED = range(8)
+"""State of a search over regions: entries in all buckets; the goal's region; width of a bucket, as
+a shift; the bucket at work, the lowest and the highest used; the first entry never used, the first
+given back."""
 STREAMED, TOUCHED, EXPANDED = 1, 16, 256
 """Work of a cell summed, a word or cell touched, a node expanded, in 1/256 of an expansion."""
 
@@ -56,7 +59,7 @@ class Regions(NamedTuple):
 
 
 class RegionRun(NamedTuple):
-    """Arrays of a search over regions: label, heap, key and slot as in other searches.
+    """Arrays of a search over regions: buckets, their entries and labels as in `improving`.
 
     Of each region, pin: the cell where it is entered. parent: the region from which. door: the
     cells that join the two, as bits along their border, and the side of the parent in the next
@@ -65,13 +68,14 @@ class RegionRun(NamedTuple):
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]
-    key: NDArray[np.int64]
-    heap: NDArray[np.int32]
-    slot: NDArray[np.int32]
+    bucket: NDArray[np.int32]
+    entry: NDArray[np.int32]
+    behind: NDArray[np.int32]
     pin: NDArray[np.int32]
     parent: NDArray[np.int32]
     door: NDArray[np.int32]
     bend: NDArray[np.int32]
+    cheapest: NDArray[np.int64]
     state: NDArray[np.int64]
 
 
@@ -91,14 +95,16 @@ def new_region_run(rows: int, columns: int) -> RegionRun:
     return RegionRun(
         clock=np.zeros(1, np.int64),
         label=np.zeros(regions, np.int64),
-        key=np.zeros(regions, np.int64),
-        heap=np.zeros(regions, np.int32),
-        slot=np.zeros(regions, np.int32),
+        bucket=np.full(BUCKETS, NOTHING, np.int32),
+        # Two blocks share at most 8 cells of a border, so this many joins at most.
+        entry=np.zeros(regions + 1, np.int32),
+        behind=np.zeros(regions + 1, np.int32),
         pin=np.zeros(regions, np.int32),
         parent=np.zeros(regions, np.int32),
         door=np.zeros(regions, np.int32),
         bend=np.zeros(regions, np.int32),
-        state=np.zeros(3, np.int64),
+        cheapest=np.zeros(regions, np.int64),
+        state=np.zeros(8, np.int64),
     )
 
 
@@ -199,27 +205,36 @@ def forget(regions, columns, top, left, bottom, right):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin_regions(cost, wall, dearest, columns, start, goal, regions, run):
+def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, run):
     """Begin a search from start to goal; return the work, in 1/256 expansions."""
-    across = (columns + SIDE - 1) // SIDE
-    work = 0
+    rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
+    state, work = run.state, 0
     for node in (start, goal):
         block = node // columns // SIDE * across + node % columns // SIDE
         work += know(cost, wall, dearest, columns, block, regions)
     base = next_base(run)
+    for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
+        run.bucket[place & (BUCKETS - 1)] = NOTHING
     first, last = region_of(columns, start, regions), region_of(columns, goal, regions)
-    run.state[0], run.state[1], run.state[2] = 1, first, last
+    state[OPENED], state[LAST_REGION], state[LOW], state[HIGH] = 0, last, 0, -1
     if first < 0 or last < 0:
-        run.state[0] = 0
         return work
+    # All that is open at once must fit into the ring of buckets: f falls on the way to the goal by
+    # what the weight adds, and rises with one step by at most two blocks each way and back.
+    spread = (percent - 100) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
+    state[SHIFT] = BUCKET_SHIFT
+    while spread >> state[SHIFT] >= BUCKETS // 2:
+        state[SHIFT] += 1
     run.label[first] = base
-    run.key[0] = 0
-    run.heap[0] = first
-    run.slot[first] = 0
     run.pin[first] = start
     run.parent[first] = -1
     run.door[first] = 0
     run.bend[first] = start
+    h = least_way(start // columns - goal // columns, start % columns - goal % columns, True)
+    state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
+    state[CURRENT] = state[LOW] = state[HIGH] = (h * percent // 100) >> state[SHIFT]
+    run.entry[0], run.behind[0] = first, NOTHING
+    run.bucket[state[CURRENT] & (BUCKETS - 1)] = 0
     return work
 
 
@@ -265,29 +280,42 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
     anew where what is straight from there does not lead through the door before.
     """
     across = (columns + SIDE - 1) // SIDE
-    high, count = regions.count.size // across, regions.count.size
-    label, key, heap, slot, edge = run.label, run.key, run.heap, run.slot, regions.edge
+    tall, count = regions.count.size // across, regions.count.size
+    label, bucket, entry, behind, edge = run.label, run.bucket, run.entry, run.behind, regions.edge
     pins, bends, doors, parents = run.pin, run.bend, run.door, run.parent
-    base, size, last, work = run.clock[0], run.state[0], run.state[2], 0
+    cheapest = run.cheapest
+    state, base, work, found = run.state, run.clock[0], 0, NO_PATH
+    shift, last, current, opened = state[SHIFT], state[LAST_REGION], state[CURRENT], state[OPENED]
+    low, high, fresh, unused = state[LOW], state[HIGH], state[FRESH], state[UNUSED]
     goal_row, goal_column = goal // columns, goal % columns
     per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
     waves = np.empty(SIDE * SIDE + 1, np.uint64)
-    while size > 0:
+    while opened > 0:
         if work >= budget:
-            run.state[0] = size
-            return OUT_OF_BUDGET, work
-        here = pop(size, heap, slot, key, label)
-        size -= 1
+            found = OUT_OF_BUDGET
+            break
+        place = np.int64(bucket[current & (BUCKETS - 1)])
+        if place < 0:
+            current += 1
+            continue
+        bucket[current & (BUCKETS - 1)] = behind[place]
+        behind[place], unused = unused, place
+        opened -= 1
+        here = np.int64(entry[place])
+        if label[here] & 1:  # closed
+            continue
         work += EXPANDED
+        pin_g = base - label[here]
+        label[here] -= 1
         if here == last:
-            run.state[0] = size
-            return FOUND, work
+            found = FOUND
+            break
         # Divisions of integers would take most of the time.
         block = here - int((here + 0.5) * per_block) * count
         block_row = int((block + 0.5) * per_across)
         block_column = block - block_row * across
         top, left = block_row * SIDE, block_column * SIDE
-        pin, bend, pin_g = np.int64(pins[here]), np.int64(bends[here]), base - label[here]
+        pin, bend = np.int64(pins[here]), np.int64(bends[here])
         pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
         pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
         door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
@@ -305,7 +333,7 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                 there, line, outside = block - across, top - 1, top == 0
             elif side == 1:
                 there, line = block + across, top + SIDE
-                outside = block_row + 1 == high
+                outside = block_row + 1 == tall
             elif side == 2:
                 there, line, outside = block - 1, left - 1, left == 0
             else:
@@ -320,8 +348,9 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                 join = mine & (np.int64(edge[region]) >> (SIDE * (side ^ 1)))
                 if join == 0:
                     continue
-                known = label[region] > base - SPAN
-                if known and slot[region] == CLOSED:
+                old = label[region]
+                known = old > base - SPAN
+                if known and old & 1:
                     continue
                 from_row, from_column, from_g, from_cell = bend_row, bend_column, bend_g, bend
                 row, column = line, line
@@ -369,21 +398,26 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                     h = least_way(row - goal_row, column - goal_column, diagonals)
                     g, from_cell = least - h, row * columns + column
                 f = g + h * percent // 100
-                if known and f >= key[slot[region]]:
+                if known and f >= cheapest[region]:
                     continue
-                label[region] = base - g
+                label[region], cheapest[region] = base - g, f
                 pins[region] = row * columns + column
                 bends[region] = from_cell
                 doors[region] = join | (side ^ 1) << SIDE
                 parents[region] = here
-                if known:
-                    place = np.int64(slot[region])
+                if unused >= 0:
+                    place, unused = unused, np.int64(behind[unused])
                 else:
-                    place = size
-                    size += 1
-                sift_up(place, region, f, heap, slot, key, label)
-    run.state[0] = 0
-    return NO_PATH, work
+                    place = fresh
+                    fresh += 1
+                number = f >> shift
+                entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
+                bucket[number & (BUCKETS - 1)] = place
+                opened += 1
+                current, low, high = min(current, number), min(low, number), max(high, number)
+    state[CURRENT], state[OPENED] = current, opened
+    state[LOW], state[HIGH], state[FRESH], state[UNUSED] = low, high, fresh, unused
+    return found, work
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

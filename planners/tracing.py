@@ -12,6 +12,7 @@ from planners.blocks import (
     FIRST_COLUMN,
     FIRST_ROW,
     LAST_BIT,
+    LAST_REGION,
     LAST_ROW,
     SIDE,
     ZERO,
@@ -33,13 +34,13 @@ def pins_of(columns, goal, diagonals, regions, run):
     its neighbours, `TAUT` times. Returns (pins, the regions that they
     enter, cells touched).
     """
-    count, region = 2, run.state[2]
+    count, region = 2, run.state[LAST_REGION]
     while run.parent[region] >= 0:
         count += 1
         region = run.parent[region]
     pins, way = np.empty(count, np.int32), np.empty(count - 1, np.int64)
     pins[count - 1] = goal
-    region = run.state[2]
+    region = run.state[LAST_REGION]
     for place in range(count - 2, -1, -1):
         pins[place] = run.pin[region]
         way[place] = region
