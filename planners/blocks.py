@@ -22,14 +22,14 @@ from planners.frontier import (
     least_way,
     next_base,
 )
-from planners.search import BUCKET_SHIFT, DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
+from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
 FRONTIER = "ebad7d52fa6d"
 
 FOUND = 0
 SIDE, MOST = 8, 32
 UNKNOWN = 255
-BUCKETS, NOTHING = 1 << 13, -1
+BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
 OPENED, LAST_REGION, SHIFT, CURRENT, LOW, HIGH, FRESH, UNUSED = range(8)
 """State of a search over regions: entries in all buckets; the goal's region; width of a bucket, as
 a shift; the bucket at work, the lowest and the highest used; the first entry never used, the first
@@ -222,8 +222,8 @@ def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, r
     # All that is open at once must fit into the ring of buckets: f falls on the way to the goal by
     # what the weight adds, and rises with one step by at most two blocks each way and back.
     spread = (percent - 100) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
-    state[SHIFT] = BUCKET_SHIFT
-    while spread >> state[SHIFT] >= BUCKETS // 2:
+    state[SHIFT] = FINE
+    while spread >> state[SHIFT] >= BUCKETS:
         state[SHIFT] += 1
     run.label[first] = base
     run.pin[first] = start
