@@ -183,7 +183,7 @@ class _Query:
             self.least = self.cost
         yield float(taken)
 
-    def _norm(self, scale: float | None) -> NDArray[np.int64]:
+    def _norm(self, scale: float | None) -> list[int]:
         if scale is None:
             return least_norm(self.diagonals)
         return expected_norm(self.grid.features[0], scale, self.diagonals)

@@ -36,7 +36,7 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
     first, last, _ = endpoints(grid, start, goal, 8)
     columns, run, known = grid.shape[1], new_run(*grid.shape), float(SPAN)
     for weight in weights:
-        run.norm[:] = np.round(weight * least_norm(True)).astype(np.int64)
+        run.norm[:] = [round(weight * each) for each in least_norm(True)]
         begin(grid.cost, columns, first, last, int(known), weight == 1.0, run)
         found = OUT_OF_BUDGET
         while found == OUT_OF_BUDGET:
