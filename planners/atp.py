@@ -3,10 +3,10 @@
 The paper's planner (`planners.paper_atp`) searches abstractly by obstacleness and refines segments
 between points that it has pinned; it fails where there are walls. This one keeps the outline, first
 coarse, then ever finer where it is worst. Where obstacles are walls, the coarse way leads over the
-graph of regions, whose connectivity is exact; where they are independent of each other, a weight
-that suits their density lets a search run straight through. The way in hand is then made shorter in
-windows along it or in a corridor around it, and at last by a search that proves it optimal and
-makes it shorter on the way there.
+graph of regions, whose connectivity is exact; where they are independent of each other, a heuristic
+that expects what ways cost at their density lets a search run straight through. The way in hand is
+then made shorter, in windows along it or by searches that expect ever less, and at last by one that
+proves it optimal and makes it shorter on the way there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A way that is made shorter: best-first search in a corridor around it, and in windows along it.
+"""A way that is made shorter: best-first search on the whole map, and in windows along it.
 
 A search gives its time back after any number of expansions and goes on later. It knows the way in
 hand: nothing is expanded that cannot beat it, and where the search comes to a cell of that way more
@@ -19,15 +19,13 @@ FRONTIER = "ebad7d52fa6d"
 DONE = 0
 BUCKETS = 1 << 13
 BASE, SHIFT, CURRENT, LOW, HIGH, OPENED, FRESH, UNUSED = range(8)
-EXACT, CONFINED, FOLLOWS, UPPER, GAIN, MEETING, COUNT, POSITION = range(8, 16)
+EXACT, FOLLOWS, UPPER, GAIN, MEETING, COUNT, POSITION = range(8, 15)
 """State of a search: base of its labels; width of a bucket, as a shift; the bucket at work, the
 lowest and the highest used; entries in all of them; the first entry never used, the first given
-back. Whether its heuristic is a lower bound, whether a corridor confines it, whether it knows the
-way's cost up to each cell; cost of the way in hand; by how much it is beaten, and at which cell. Of
-the way: its cells; where the next window begins."""
+back. Whether its norm is a lower bound; whether it knows the way's cost up to each cell; cost of
+the way in hand; by how much it is beaten, and at which cell. Of the way: its cells; where the next
+window begins."""
 NOTHING = -1
-BLOCK_SHIFT = 3
-"""A corridor is made of blocks of 8 x 8 cells."""
 _NARROW = 12  # 4 096 is less than the smallest positive step of f on a free floor
 _ENTRIES = 8
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
@@ -38,8 +36,7 @@ class Run(NamedTuple):
 
     Of every cell: label (`base` - g, one less when it is closed), prefix (`base` + cost of the way
     in hand up to the cell). bucket: the first entry of each. entry, behind: an entry's cell and the
-    entry after it. norm: the heuristic, see `estimated`. mark: of every block, the base of the
-    search whose corridor it is in. path: flat indices of the way in hand.
+    entry after it. norm: the heuristic, see `estimated`. path: flat indices of the way in hand.
     """
 
     clock: NDArray[np.int64]
@@ -49,15 +46,13 @@ class Run(NamedTuple):
     entry: NDArray[np.int32]
     behind: NDArray[np.int32]
     norm: NDArray[np.int64]
-    mark: NDArray[np.int64]
     path: NDArray[np.int32]
     state: NDArray[np.int64]
 
 
 def new_run(rows: int, columns: int) -> Run:
     """Arrays for a map of that size."""
-    cells, across = rows * columns, 1 << BLOCK_SHIFT
-    blocks = -(-rows // across) * -(-columns // across)
+    cells = rows * columns
     return Run(
         clock=np.zeros(1, np.int64),
         label=np.zeros(cells, np.int64),
@@ -66,9 +61,8 @@ def new_run(rows: int, columns: int) -> Run:
         entry=np.zeros(_ENTRIES * cells, np.int32),
         behind=np.zeros(_ENTRIES * cells, np.int32),
         norm=np.zeros(6, np.int64),
-        mark=np.zeros(blocks, np.int64),
         path=np.zeros(cells + 1, np.int32),
-        state=np.zeros(16, np.int64),
+        state=np.zeros(15, np.int64),
     )
 
 
@@ -107,7 +101,6 @@ def begin(cost, columns, start, goal, upper, exact, run):
     cost less than `upper`."""
     if run.clock[0] >= LAST:  # the labels are about to be cleared: these go by the same bases
         run.prefix[:] = 0
-        run.mark[:] = 0
     base, state, norm, bucket = next_base(run), run.state, run.norm, run.bucket
     for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
         bucket[place & (BUCKETS - 1)] = NOTHING
@@ -117,7 +110,7 @@ def begin(cost, columns, start, goal, upper, exact, run):
     state[CURRENT] = state[LOW] = state[HIGH] = f >> shift
     state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
     state[UPPER], state[GAIN], state[MEETING] = upper, 0, NOTHING
-    state[CONFINED], state[FOLLOWS] = 0, 0
+    state[FOLLOWS] = 0
     run.label[start] = base
     run.entry[0], run.behind[0] = start, NOTHING
     bucket[state[CURRENT] & (BUCKETS - 1)] = 0
@@ -132,13 +125,13 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
     the buckets correct labels: a node may be expanded twice while the same bucket is at work.
     """
     # Arrays are taken out of the tuple once: inside the loop that would count references.
-    state, label, prefix, mark, norm = run.state, run.label, run.prefix, run.mark, run.norm
+    state, label, prefix, norm = run.state, run.label, run.prefix, run.norm
     bucket, entry, behind = run.bucket, run.entry, run.behind
     one_far, one_near, two_far, two_near, three_far, three_near = (
         norm[0], norm[1], norm[2], norm[3], norm[4], norm[5],
     )  # fmt: skip
-    rows, across = cost.size // columns, (columns + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    exact, confined, follows = state[EXACT] != 0, state[CONFINED] != 0, state[FOLLOWS] != 0
+    rows = cost.size // columns
+    exact, follows = state[EXACT] != 0, state[FOLLOWS] != 0
     base, shift, current, opened = state[BASE], state[SHIFT], state[CURRENT], state[OPENED]
     low, high, fresh, unused = state[LOW], state[HIGH], state[FRESH], state[UNUSED]
     goal_row, goal_column = goal // columns, goal % columns
@@ -233,10 +226,6 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
             )
             if new_g + h >= upper:
                 continue
-            if confined:
-                block = ((row + dr) >> BLOCK_SHIFT) * across + ((column + dc) >> BLOCK_SHIFT)
-                if mark[block] != base:
-                    continue
             label[there] = base - new_g
             number = (new_g + h) >> shift
             if known and not old & 1 and (base - old + h) >> shift == number:
@@ -359,30 +348,6 @@ def follow_way(cost, wall, columns, run):
     for place in range(run.state[COUNT] - 1):
         total += way_cost(cost, wall, columns, run.path, place, place + 1)
         run.prefix[run.path[place + 1]] = base + total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def confine(rows, columns, radius, run):
-    """Confine the search that has begun to the blocks at most `radius` steps from the way in hand.
-
-    Returns how many blocks were touched.
-    """
-    high = (rows + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    wide = (columns + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    base, touched, before = run.state[BASE], 0, -1
-    run.state[CONFINED] = 1
-    for place in range(run.state[COUNT]):
-        node = np.int64(run.path[place])
-        row, column = (node // columns) >> BLOCK_SHIFT, (node % columns) >> BLOCK_SHIFT
-        if row * wide + column == before:
-            continue
-        before = row * wide + column
-        for r in range(max(row - radius, 0), min(row + radius + 1, high)):
-            left = radius - abs(r - row)
-            for c in range(max(column - left, 0), min(column + left + 1, wide)):
-                touched += 1
-                run.mark[r * wide + c] = base
-    return touched
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
