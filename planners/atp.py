@@ -35,7 +35,8 @@ _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
 _REGION_PERCENT = 104  # weight of the search over regions between ends 128 cells apart …
 _PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
 _FIRST, _SCALES = 1.08, (1.015, 0.995)
-"""By what the norm of independent obstacles is multiplied, search by search."""
+"""By what the norm of independent obstacles is multiplied, search by search …"""
+_TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
 _WINDOW_SHARE = 4  # … which together take at most so many times the work of the coarse way
 _PATIENCE = 12  # expansions per cell of distance after which a weight was too small
@@ -150,6 +151,10 @@ class _Query:
         """
         run, state, exact = self.run, self.run.state, scale is None
         known = not math.isinf(self.cost)
+        if scale is not None and known:
+            run.norm[:] = self._norm(1.0)
+            expected = int(improving.estimated(self.down, self.across, run.norm))
+            scale = max(scale, _TRUSTED * self.cost / expected)
         run.norm[:] = self._norm(scale)
         improving.begin(
             self.grid.cost, self.grid.shape[1], self.start, self.goal,
