@@ -1,4 +1,4 @@
-"""The divisions that a compiled one must beat. [ZR93] Fig. 8."""
+"""The divisions that a compiled one must beat, and it by the same tables. [ZR93] Fig. 8."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compiler import costs
-from compiler.division import expected_quality, moments_within
+from compiler.division import Frontier, expected_quality, moments_within
 from compiler.tables import Floats, Table
 
 
@@ -42,6 +42,17 @@ def maximal(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
 def equal_shares(tables: Sequence[Table], seconds: ArrayLike) -> Floats:
     """Expected quality of equal shares for each budget, [T]."""
     return _promised(tables, seconds, even_shares)
+
+
+def divided(tables: Sequence[Table], frontier: Frontier, seconds: ArrayLike) -> Floats:
+    """Expected quality of the compiled divisions for each budget, [T], by the tables as that of the
+    others is; what is promised is calibrated on problems never seen."""
+
+    def shares_of(tables: Sequence[Table], seconds: float) -> list[float]:
+        index = frontier.index(seconds)
+        return [-1.0] * len(tables) if index < 0 else frontier.shares[index].tolist()
+
+    return _promised(tables, seconds, shares_of)
 
 
 def _promised(

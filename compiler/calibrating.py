@@ -52,7 +52,8 @@ class Calibration:
 
     def _corrected(self, levels: Floats) -> Floats:
         # Beyond the knots the correction stays what it is at the last.
-        return levels + np.interp(levels, self.levels, self.promised - self.levels)
+        corrected = levels + np.interp(levels, self.levels, self.promised - self.levels)
+        return np.clip(corrected, 0.0, 1.0)
 
     def rows(self) -> list[tuple[float, float, float, float]]:
         """Level, promise, low and high end of each knot."""
@@ -60,7 +61,8 @@ class Calibration:
 
     def applied(self, frontier: Frontier) -> Frontier:
         """The frontier with what may be promised in place of what the tables say."""
-        return replace(frontier, promised=self._corrected(frontier.promised))
+        promised = self._corrected(frontier.promised)
+        return replace(frontier, promised=np.maximum.accumulate(promised))  # but for rounding
 
 
 AS_IT_IS = Calibration(*(np.array([0.0, 1.0]) for _ in range(4)))

@@ -17,6 +17,7 @@ from monitor.page import write_page
 from monitor.reports import Report
 from monitor.robots.briefing import Briefing, brief
 from monitor.robots.grid_missions import GridMission
+from monitor.robots.lessons import user_memory
 from monitor.robots.navigation import frame_problems, navigate
 
 PROBLEMS = 30
@@ -95,7 +96,7 @@ def run(grid: GridMission, *, seeds: Sequence[int], tell: Tell, seed: int = 0) -
     """
     library = measured(grid, seed, lambda done, total: tell("measuring", done, total))
     tell("calibrating", 0, 1)
-    briefing = brief(grid, library)
+    briefing = brief(grid, library, memory=user_memory())
     reports: dict[str, tuple[Report, ...]] = {}
     total = len(ROWS) * len(seeds)
     for row, policy in ROWS.items():

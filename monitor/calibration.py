@@ -9,7 +9,7 @@ import numpy as np
 
 from compiler import CompiledProgram
 from monitor.bodies import Robot
-from monitor.courses import Course, course_of, legs_of, refined, smoothed
+from monitor.courses import Course, Leg, course_of, legs_of, refined, smoothed
 from monitor.inter_frame import Contracts, Spread
 from monitor.missions import Mission, Value
 from monitor.monitoring import Monitor
@@ -25,14 +25,14 @@ PATIENCE = 3.0  # deadlines that a mission of calibration may last
 
 @dataclass(frozen=True)
 class Steady:
-    """Missions that were lived at one constant division.
+    """What missions taught that were lived at one constant division.
 
-    shares: seconds of each call. routes: length of each mission's route when it began.
+    shares: seconds of each call. lived, legs: of each mission.
     """
 
     shares: tuple[float, ...]
-    routes: tuple[float, ...]
-    reports: tuple[Report, ...]
+    lived: tuple[Lived, ...]
+    legs: tuple[tuple[Leg, ...], ...]
 
 
 def live_steadily(
@@ -58,16 +58,16 @@ def live_steadily(
         shares = (float(time), *[longest / max(rest, 1)] * rest)
         division = dict(zip(program.labels, shares, strict=True))
         policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
-        routes: list[float] = []
-        reports: list[Report] = []
+        told: list[Lived] = []
+        legs: list[tuple[Leg, ...]] = []
         for seed in seeds:
             robot = make_robot()
             route = robot.situation().to_go
             report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
             if report and route > 0:
-                routes.append(route)
-                reports.append(report)
-        lived.append(Steady(shares, tuple(routes), tuple(reports)))
+                told.append(_lived(float(time), route, report))
+                legs.append(legs_of(report))
+        lived.append(Steady(shares, tuple(told), tuple(legs)))
     return tuple(lived)
 
 
@@ -89,19 +89,13 @@ def measure_rhythm(
 
 def rhythm_from(lived: Sequence[Steady]) -> Rhythm | None:
     """The rhythm of missions lived at constant divisions; None if there are none."""
-    missions = [
-        _lived(steady.shares[0], route, report)
-        for steady in lived
-        for route, report in zip(steady.routes, steady.reports, strict=True)
-    ]
+    missions = [mission for steady in lived for mission in steady.lived]
     return rhythm_of(missions) if missions else None
 
 
 def courses_from(lived: Sequence[Steady]) -> tuple[Course, ...]:
     """The courses of missions lived at constant divisions."""
-    found = [
-        course_of([legs_of(report) for report in steady.reports], steady.shares) for steady in lived
-    ]
+    found = [course_of(steady.legs, steady.shares) for steady in lived]
     return refined(smoothed([course for course in found if course is not None]))
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from compiler import CompiledProgram
 from monitor.calibration import MakeRobot, Steady
-from monitor.courses import Leg, legs_of
+from monitor.courses import Leg
 from monitor.missions import Mission
 from monitor.monitoring import Monitor
 from monitor.policies import Constant, Policy, constant
@@ -23,37 +23,44 @@ DOUBT = 10.0  # missions that speak for a promise as it is
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """One of several policies, chosen by held-out missions.
+class Verdict:
+    """What held-out missions said of several policies.
 
-    policies: all of them by name; name: of the one. nets: net value of each held-out mission, by
-    policy, on the same seeds. missed: mean by which those of the chosen policy were worth more
-    than it had promised; None if it foresees nothing.
+    name: of the best. nets: net value of each mission, by policy, on the same seeds. missed: mean
+    by which those of the best were worth more than it had promised; None if it foresees nothing.
     """
 
-    policies: Mapping[str, Policy]
     name: str
     nets: Mapping[str, tuple[float, ...]]
     missed: float | None
 
+
+@dataclass(frozen=True)
+class Chosen:
+    """Of several policies by name the one that held-out missions chose."""
+
+    policies: Mapping[str, Policy]
+    verdict: Verdict
+
     def __call__(self, state: State) -> Decision:
-        decision = self.policies[self.name](state)
+        verdict = self.verdict
+        decision = self.policies[verdict.name](state)
         if state.moment != "frame":
             return decision
-        if self.missed is None:  # what it was worth before is what it promises
+        if verdict.missed is None:  # what it was worth before is what it promises
             if state.frame:
                 return decision
-            worth = float(np.mean(self.nets[self.name]))
+            worth = float(np.mean(verdict.nets[verdict.name]))
             curve = ((decision.contract, worth),)
             return replace(decision, why=replace(decision.why, value=worth, curve=curve))
         situation, why = state.situation, decision.why
         share = (situation.to_go + situation.in_hand) / state.route if state.route > 0 else 0.0
-        more = self.missed * min(share, 1.0)
+        more = verdict.missed * min(share, 1.0)
         curve = tuple((contract, net + more) for contract, net in why.curve)
         return replace(decision, why=replace(why, value=why.value + more, curve=curve))
 
 
-def choose_policy(
+def judge_policies(
     program: CompiledProgram,
     mission: Mission,
     policies: Mapping[str, Policy],
@@ -61,8 +68,8 @@ def choose_policy(
     make_robot: MakeRobot,
     *,
     seeds: Sequence[int],
-) -> Chosen:
-    """The policy with the greatest mean net value on these seeds, which made none of them."""
+) -> Verdict:
+    """Which has the greatest mean net value on these seeds, which made none of them."""
     lived = {
         name: [
             Monitor(program, policy, name, rhythm).run(mission, make_robot(), seed=seed)
@@ -75,7 +82,7 @@ def choose_policy(
     missed = float(np.mean([report.net - report.promised for report in lived[name]]))
     # A few missions say little about the promise; the fewer, the less they correct it.
     trust = len(seeds) / (len(seeds) + DOUBT)
-    return Chosen(policies, name, nets, trust * missed if np.isfinite(missed) else None)
+    return Verdict(name, nets, trust * missed if np.isfinite(missed) else None)
 
 
 def tuned_division(
@@ -89,9 +96,9 @@ def tuned_division(
     speeds = np.geomspace(*mission.speeds, SPEEDS)
     best: tuple[float, Constant] | None = None
     for steady in lived:
-        if not steady.reports:
+        if not steady.legs:
             continue
-        nets = np.mean([_nets(mission, legs_of(report), speeds) for report in steady.reports], 0)
+        nets = np.mean([_nets(mission, legs, speeds) for legs in steady.legs], axis=0)
         index = int(np.argmax(nets))
         if best is None or nets[index] > best[0]:
             shares = dict(zip(program.labels, steady.shares, strict=True))

@@ -70,7 +70,10 @@ def solve(lengths, planning, progress, energy, price, value, actions, worth):
                 if lengths[y] > 0 and now[f - 1, lengths[y], 0] >= now[f, 0, y]:
                     now[f, 0, y] = now[f - 1, lengths[y], 0]
                     actions[t, f, 0, y] = 2 * speeds + 2
-        worth[t] = now
+        for f in range(frames):  # one by one, or numba compiles numpy's words for other shapes
+            for x in range(cells):
+                for y in range(levels):
+                    worth[t, f, x, y] = now[f, x, y]
         after, now = now, after
     return after[frames - 1, 0, 0]
 

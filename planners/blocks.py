@@ -24,7 +24,7 @@ from planners.frontier import (
 )
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-FRONTIER = "ebad7d52fa6d"
+FRONTIER = "e939f8aacbfe"
 
 FOUND = 0
 SIDE, MOST = 8, 32

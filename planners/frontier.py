@@ -137,6 +137,19 @@ def cells_of(path, columns):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def with_room(row, used, room):
+    """Return the `used` first numbers of a row at the beginning of one of `room` numbers.
+
+    One by one: to assign a slice, numba compiles numpy's words for shapes that do not fit, which
+    takes four seconds.
+    """
+    longer = np.empty(room, np.int32)
+    for place in range(used):
+        longer[place] = row[place]
+    return longer
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def path_to(cost, wall, columns, start, node, diagonals, work):
     """Read the path from `start` to `node` back from the labels of the last search."""
     rows, base, label = cost.size // columns, work.clock[0], work.label
@@ -144,9 +157,7 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
     count, row, column = 0, node // columns, node % columns
     while True:
         if count == path.size:
-            longer = np.empty(2 * count, np.int32)
-            longer[:count] = path
-            path = longer
+            path = with_room(path, count, 2 * count)
         path[count] = node
         count += 1
         if node == start:

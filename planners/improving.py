@@ -11,10 +11,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import next_base, path_to, step_between, step_cost
+from planners.frontier import next_base, path_to, step_between, step_cost, with_room
 from planners.search import DIAGONAL, LAST, OUT_OF_BUDGET, SPAN, STRAIGHT, WALL
 
-FRONTIER = "ebad7d52fa6d"
+FRONTIER = "e939f8aacbfe"
 
 DONE = 0
 BUCKETS = 1 << 13
@@ -299,9 +299,9 @@ def so_far(cost, wall, columns, start, diagonals, run):
     rest = 0
     while run.path[rest] != node:
         rest += 1
-    way = np.empty(beginning.size + count - rest - 1, np.int32)
-    way[: beginning.size] = beginning
-    way[beginning.size :] = run.path[rest + 1 : count]
+    way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
+    for place in range(rest + 1, count):
+        way[beginning.size + place - rest - 1] = run.path[place]
     return way
 
 
@@ -335,7 +335,8 @@ def _replace(run, first, last, piece):
     elif grown < 0:
         for place in range(last + 1, count):
             run.path[place + grown] = run.path[place]
-    run.path[first : first + piece.size] = piece
+    for place in range(piece.size):
+        run.path[first + place] = piece[place]
     run.state[COUNT] = count + grown
 
 

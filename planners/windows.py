@@ -14,7 +14,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import next_base, octile, path_to, pop, sift_up, step_cost
+from planners.frontier import (
+    next_base,
+    octile,
+    path_to,
+    pop,
+    sift_up,
+    step_cost,
+    with_room,
+)
 from planners.search import (
     CLOSED,
     DIAGONAL,
@@ -26,7 +34,7 @@ from planners.search import (
     WALL,
 )
 
-FRONTIER = "ebad7d52fa6d"
+FRONTIER = "e939f8aacbfe"
 
 # numba compiles a callee once more for every literal argument; these are no literals.
 YES, ZERO, CHEAPEST, EXACT = np.bool_(True), np.int64(0), np.int64(1), np.int64(100)
@@ -246,9 +254,7 @@ def walk(free, cost, touched, columns, plan, start, goal, limit, work):
             node = there
             _touch(free, cost, touched, columns, node)
             if steps == path.size:
-                longer = np.empty(2 * steps, np.int32)
-                longer[:steps] = path
-                path = longer
+                path = with_room(path, steps, 2 * steps)
             path[steps] = node
             steps += 1
             if node == goal:
@@ -296,7 +302,9 @@ def _with_room(rows, used):
     if used < rows.shape[0]:
         return rows
     more = np.zeros((2 * rows.shape[0], rows.shape[1]), np.int32)
-    more[:used] = rows[:used]
+    for row in range(used):
+        for column in range(rows.shape[1]):
+            more[row, column] = rows[row, column]
     return more
 
 
@@ -314,9 +322,9 @@ def _add_segment(plan, pyramid, level, path, left, right):
     number, used = np.int64(plan.size[SEGMENTS]), np.int64(plan.size[CELLS])
     segment, cell = _with_room(plan.segment, number), plan.cell
     if used + path.size > cell.size:
-        cell = np.zeros(2 * (used + path.size), np.int32)
-        cell[:used] = plan.cell[:used]
-    cell[used : used + path.size] = path
+        cell = with_room(cell, used, 2 * (used + path.size))
+    for place in range(path.size):
+        cell[used + place] = path[place]
     segment[number, LEVEL] = level
     segment[number, FIRST] = used
     segment[number, COUNT] = path.size
@@ -521,7 +529,8 @@ def refine(plan, pyramid, grain, work):
                 plan.segment[number, FINAL] = 1
             if half == 0:
                 # The first half takes the parent's place, so that whoever links to it still does.
-                plan.segment[worst] = plan.segment[number]
+                for column in range(plan.segment.shape[1]):
+                    plan.segment[worst, column] = plan.segment[number, column]
             else:
                 plan.segment[before, NEXT] = number
                 before = number

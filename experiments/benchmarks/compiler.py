@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -11,9 +10,7 @@ import numpy as np
 from anytime import Deadline, WorkClock
 from anytime import measure as measure_profiles
 from compiler import CompiledProgram, compile
-from compiler.baselines import maximal, maximal_shares, minimal, minimal_shares
-from compiler.division import divide
-from compiler.tables import Table
+from compiler.baselines import divided, maximal, maximal_shares, minimal, minimal_shares
 from experiments.benchmarks import (
     compiler_adaptive,
     compiler_constructs,
@@ -24,6 +21,7 @@ from experiments.benchmarks.compiler_advice import measure_advice, measure_rover
 from experiments.benchmarks.compiler_constructs import KINDS
 from experiments.benchmarks.compiler_engine import engine_figures
 from experiments.benchmarks.compiler_promises import measure_promises
+from experiments.benchmarks.compiler_trees import mismatch, random_program
 from experiments.benchmarks.figures import Benchmark
 from experiments.domains import MACHINE, Domain, cross, domain
 
@@ -51,7 +49,7 @@ def measure(
     )
     compiled = compile(cross, library)
     budgets = np.linspace(compiled.least, float(compiled.frontier.budgets[-1]), 400)
-    promised = np.array([compiled.promise(t) for t in budgets])
+    promised = divided(compiled.tables, compiled.frontier, budgets)
     better = np.maximum(minimal(compiled.tables, budgets), maximal(compiled.tables, budgets))
     figures: dict[str, float | int | None] = {
         "fig8.below_min_max": int((promised < better - 1e-4).sum()),
@@ -68,9 +66,9 @@ def measure(
     trees, dags = (200, 100) if quick else (2000, 1000)
     progress(f"{trees} trees and {dags} DAGs against brute force")
     rng = np.random.default_rng(seed)
-    figures["tree.mismatches"] = sum(_mismatch(random_program(rng, False)) for _ in range(trees))
+    figures["tree.mismatches"] = sum(mismatch(random_program(rng, False)) for _ in range(trees))
     figures["tree.count"] = trees
-    figures["dag.mismatches"] = sum(_mismatch(random_program(rng, True)) for _ in range(dags))
+    figures["dag.mismatches"] = sum(mismatch(random_program(rng, True)) for _ in range(dags))
     figures["dag.count"] = dags
     each = 40 if quick else 400
     progress(f"{each} programs with each construct against living every division")
@@ -82,7 +80,7 @@ def measure(
     for part in (measure_promises, measure_advice, measure_rover):
         figures |= part(quick=quick, seed=seed, progress=progress)
     figures["dag5.mismatches"] = sum(
-        _mismatch(random_program(rng, True, calls=5)) for _ in range(dags)
+        mismatch(random_program(rng, True, calls=5)) for _ in range(dags)
     )
     engine, how = engine_figures(quick, seed, progress)
     figures |= engine
@@ -156,62 +154,3 @@ def _achieved(
         if in_time:
             qualities[index] = compiled.program.output.module.score(in_time[-1], problem)
     return qualities
-
-
-def random_program(
-    rng: np.random.Generator, shared: bool, calls: int | None = None
-) -> tuple[Table, ...]:
-    """Deterministic tables of a random program of 2 to 4 calls, or of so many; half of them are not
-    monotone in their inputs. With `shared` a result may feed several calls."""
-    count = int(rng.integers(2, 5)) if calls is None else calls
-    monotone = bool(rng.random() < 0.5)
-    feeds: list[list[int]] = [[] for _ in range(count)]
-    for place in range(count - 1):
-        users = rng.choice(np.arange(place + 1, count), size=1 + int(shared and rng.random() < 0.6))
-        for user in {int(user) for user in users}:
-            if len(feeds[user]) < 2:
-                feeds[user].append(place)
-        if not any(place in fed for fed in feeds):
-            feeds[count - 1].append(place)
-    tables: list[Table] = []
-    for place in range(count):
-        levels = int(rng.integers(3, 6))
-        times = np.concatenate([[0.0], np.cumsum(rng.integers(1, 4, size=int(rng.integers(2, 5))))])
-        shape = [len(tables[fed].levels) for fed in feeds[place]]
-        reached = rng.integers(0, levels, size=(*shape, len(times)))
-        reached[..., 0] = 0
-        if monotone:
-            for axis in range(reached.ndim):
-                reached = np.maximum.accumulate(reached, axis=axis)
-        for axis in range(len(shape)):
-            reached[(slice(None),) * axis + (0,)] = 0  # no input, no result
-        chances = (reached[..., None] == np.arange(levels)).astype(float)
-        qualities = np.concatenate([[0.0], np.sort(rng.random(levels - 1)).round(6)])
-        labels = tuple(f"call {fed}" for fed in feeds[place])
-        tables.append(
-            Table(
-                f"call {place}", f"call {place}", labels, qualities, times, chances, float(times[1])
-            )
-        )
-    return tuple(tables)
-
-
-def _mismatch(tables: Sequence[Table]) -> bool:
-    """Whether the compiled promise differs from the best of all divisions at any budget."""
-    best: dict[float, float] = {}
-    for moments in itertools.product(*(range(len(table.times)) for table in tables)):
-        level: dict[str, int] = {}
-        for table, moment in zip(tables, moments, strict=True):
-            fed = tuple(level[name] for name in table.feeds)
-            level[table.label] = int(table.chances[(*fed, moment)].argmax())
-        total = float(sum(t.times[m] for t, m in zip(tables, moments, strict=True)))
-        quality = float(tables[-1].levels[level[tables[-1].label]])
-        best[total] = max(best.get(total, 0.0), quality)
-    frontier = divide(tables)
-    reached = 0.0
-    for budget in sorted(best):
-        reached = max(reached, best[budget])
-        promised = frontier.promise(budget) if len(frontier.budgets) else 0.0
-        if abs(promised - reached) > 1e-9:
-            return True
-    return False

@@ -95,7 +95,7 @@ def _live(grid: GridMission, seeds: range, many: bool, size: Size) -> Cell:
     ]
     nets = {name: np.array([report.net for report in lived]) for name, lived in reports.items()}
     promised = np.array([report.promised for report in reports["optimal"]])
-    return Cell(nets, promised, np.array(known), (optimal.policy.name,))
+    return Cell(nets, promised, np.array(known), (optimal.policy.verdict.name,))
 
 
 def _with_fixed(briefing: Briefing, raced: bool) -> Briefing:

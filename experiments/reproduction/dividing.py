@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from anytime import ProfileLibrary, WorkClock, measure
 from compiler import CompiledProgram, compile
+from compiler.baselines import divided as divided_by_tables
 from compiler.baselines import maximal, minimal
 from compiler.curves import curve
-from compiler.division import expected_quality, moments_within
 from compiler.sequencing import acceleration_ratio, doubled, least_ratio
-from experiments.benchmarks.compiler import _mismatch, random_program
+from experiments.benchmarks.compiler_trees import mismatch, random_program
 from experiments.domains import MACHINE, cross, cross_anywhere, domain
 from experiments.reproduction.abstraction import FAMILY, SIZE
 from experiments.reproduction.ways import PAPER, Way
@@ -44,15 +44,8 @@ class Divided:
         return np.linspace(self.compiled.least, float(self.compiled.frontier.budgets[-1]), BUDGETS)
 
     def divided(self) -> NDArray[np.float64]:
-        """Expected quality of the compiled division for each budget, by the profiles as MIN's and
-        MAX's are; `promise` would be that of domains never seen."""
-        tables, labels = self.compiled.tables, self.compiled.labels
-        found: list[float] = []
-        for seconds in self.budgets:
-            shares = self.compiled.allocate(float(seconds)).shares
-            moments = moments_within(tables, [shares[label] for label in labels])
-            found.append(expected_quality(tables, moments))
-        return np.array(found)
+        """Expected quality of the compiled division for each budget."""
+        return divided_by_tables(self.compiled.tables, self.compiled.frontier, self.budgets)
 
     def pinned(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Those of MIN and of MAX."""
@@ -89,7 +82,7 @@ def conditional_ordered(seed: int, way: Way) -> bool:
 def tree_optimal(seed: int, way: Way) -> bool:
     """Of a random tree of anytime modules, the compiled profile is that of brute force. Both ways
     are one: a module at a time, bottom up."""
-    return not _mismatch(random_program(np.random.default_rng((seed, 8)), False))
+    return not mismatch(random_program(np.random.default_rng((seed, 8)), False))
 
 
 def compiled_above_min_max(seed: int, way: Way) -> bool:

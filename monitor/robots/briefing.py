@@ -16,18 +16,19 @@ from anytime.faults import Schedule
 from compiler import CompiledProgram, compile
 from monitor.bodies import Robot
 from monitor.calibration import Steady, calibrate, courses_from, live_steadily, rhythm_from
-from monitor.choosing import Chosen, choose_policy, tuned_division
+from monitor.choosing import Chosen, Verdict, judge_policies, tuned_division
 from monitor.courses import Course
 from monitor.forking import forked
-from monitor.inter_frame import Contracts, compiled_contracts, pinned_contracts
+from monitor.inter_frame import Contracts, Spread, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
 from monitor.monitoring import Listener, Monitor
-from monitor.policies import Paper, Policy, constant
+from monitor.policies import Expected, Paper, Policy, constant
 from monitor.reports import Frame, Report
 from monitor.rhythms import Rhythm
 from monitor.robots.faulty import FaultyRobot, faulty_program
 from monitor.robots.grid import GridRobot, Scene
 from monitor.robots.grid_missions import GridMission
+from monitor.robots.lessons import NO_MEMORY, Memory
 from monitor.robots.navigation import navigate
 
 POLICIES = ("optimal", "table", "expected", "paper", "fixed", "min", "max")
@@ -60,13 +61,17 @@ def effort_for(scene: Scene) -> Effort:
 
 @dataclass(frozen=True)
 class Briefing:
-    """A grid mission with its compiled program and the rhythm that it was measured to have."""
+    """A grid mission with its compiled program and the rhythm that it was measured to have.
+
+    lived: the missions that told the rhythm. memory: where what others teach is kept.
+    """
 
     grid: GridMission
     program: CompiledProgram
     rhythm: Rhythm
     effort: Effort
     lived: tuple[Steady, ...] = ()
+    memory: Memory = NO_MEMORY
 
     def robot(self, clock: Clock | None = None) -> GridRobot:
         """The robot at the start of the mission."""
@@ -100,9 +105,9 @@ class Briefing:
             shares = {label: float(mission.fixed[label]) for label in self.program.labels}
             return constant(shares, float(mission.fixed["speed"]))
         if name in ("min", "max"):
-            return self._calibrated(pinned_contracts(self.program, name))
+            return self._calibrated(name, pinned_contracts(self.program, name))
         if name == "expected":
-            return self._calibrated(self.contracts)
+            return self._expected
         if name == "table":
             return self._tables()
         if name == "optimal":
@@ -115,36 +120,48 @@ class Briefing:
 
         mission, route = self.grid.mission, self.robot().situation().to_go
         if not self.courses or not np.isfinite(route):
-            return self._calibrated(self.contracts)
+            return self._expected
         tables = tuple(solve(mission, course, route) for course in self.courses)
         return Optimal(mission, self.program.labels, tables)
 
     def _chosen(self) -> Chosen:
         """The best of the tables, of the expectation and of a fixed division, on missions that
         made none of them."""
-        policies = {"table": self._tables(), "expected": self._calibrated(self.contracts)}
+        policies = {"table": self._tables(), "expected": self._expected}
         fixed = tuned_division(self.program, self.grid.mission, self.lived)
         if fixed is not None:
             policies["fixed"] = fixed
-        return choose_policy(
-            self.program,
-            self.grid.mission,
-            policies,
-            self.rhythm,
-            self.robot,
-            seeds=range(CHOICE_SEED, CHOICE_SEED + self.effort.choice_seeds),
+        seeds = range(CHOICE_SEED, CHOICE_SEED + self.effort.choice_seeds)
+        verdict = self.memory.recall(
+            "verdict",
+            self._learnt_from,
+            Verdict,
+            lambda: judge_policies(
+                self.program, self.grid.mission, policies, self.rhythm, self.robot, seeds=seeds
+            ),
         )
+        return Chosen(policies, verdict)
 
-    def _calibrated(self, contracts: Contracts) -> Policy:
+    @cached_property
+    def _expected(self) -> Expected:
+        return self._calibrated("expected", self.contracts)
+
+    def _calibrated(self, name: str, contracts: Contracts) -> Expected:
+        mission, rhythm = self.grid.mission, self.rhythm
         seeds = range(CALIBRATION_SEED, CALIBRATION_SEED + self.effort.seeds)
-        return calibrate(
-            self.program,
-            self.grid.mission,
-            contracts,
-            self.rhythm,
-            self.robot,
-            seeds=seeds,
+        spread = self.memory.recall(
+            f"spread-{name}",
+            self._learnt_from,
+            Spread,
+            lambda: (
+                calibrate(self.program, mission, contracts, rhythm, self.robot, seeds=seeds).spread
+            ),
         )
+        return Expected(mission, contracts, rhythm, spread)
+
+    @cached_property
+    def _learnt_from(self) -> bytes:
+        return _described(self.grid, self.program, self.effort)
 
     def live(
         self,
@@ -205,22 +222,44 @@ class Briefing:
         return report
 
 
-def brief(grid: GridMission, library: ProfileLibrary, effort: Effort | None = None) -> Briefing:
-    """Compile the paper's program for a mission's machine and measure the mission's rhythm."""
+def brief(
+    grid: GridMission,
+    library: ProfileLibrary,
+    effort: Effort | None = None,
+    memory: Memory = NO_MEMORY,
+) -> Briefing:
+    """Compile the paper's program for a mission's machine and measure the mission's rhythm.
+
+    memory: where what the missions lived before it teach is kept for the next briefing.
+    """
     effort = effort or effort_for(grid.scene)
     program = compile(navigate, library.on(grid.machine))
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)
     seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)
-    lived = live_steadily(
-        program,
-        grid.mission,
-        briefing.contracts,
-        briefing.robot,
-        seeds=seeds,
-        levels=effort.levels,
+    lived = memory.recall(
+        "lived",
+        _described(grid, program, effort),
+        tuple[Steady, ...],
+        lambda: live_steadily(
+            program,
+            grid.mission,
+            briefing.contracts,
+            briefing.robot,
+            seeds=seeds,
+            levels=effort.levels,
+        ),
     )
-    return Briefing(grid, program, rhythm_from(lived) or unknown, effort, lived)
+    return Briefing(grid, program, rhythm_from(lived) or unknown, effort, lived, memory)
+
+
+def _described(grid: GridMission, program: CompiledProgram, effort: Effort) -> bytes:
+    """All that the missions before a mission depend on, but for the code."""
+    scene, frontier = grid.scene, program.frontier
+    words = (grid.mission, grid.machine, effort, program.labels, scene.free.shape, scene.start)
+    more = (scene.goal, scene.radius, scene.frame, scene.device, scene.density)
+    arrays = (scene.free, frontier.budgets, frontier.shares, frontier.promised)
+    return repr((words, more)).encode() + b"".join(array.tobytes() for array in arrays)
 
 
 def _silent(frame: Frame) -> None:

@@ -72,6 +72,7 @@ def run(options: argparse.Namespace) -> Answer:
     from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.faulty import kinds_of
     from monitor.robots.grid_missions import read_mission
+    from monitor.robots.lessons import user_memory
     from monitor.robots.nao_scenes import is_scene
 
     if is_scene(options.mission):
@@ -95,7 +96,7 @@ def run(options: argparse.Namespace) -> Answer:
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
     with progress("calibrating"):
-        briefing = brief(grid, library)
+        briefing = brief(grid, library, memory=user_memory())
         monitor = briefing.monitor(options.policy)
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
     faults = None

@@ -881,7 +881,8 @@ def _copy(h: Any, source: int, target: int) -> None:
     logs = carray(pointer(h.logs), (2, rows, h.longest), np.int32)
     lengths = carray(pointer(h.lengths), (2, rows), np.int32)
     values = carray(pointer(h.values), (2, rows), np.float64)
-    genomes[h.side, target] = genomes[h.side, source]
+    for at in range(h.most_cells):  # one by one, or numba compiles numpy's words for other shapes
+        genomes[h.side, target, at] = genomes[h.side, source, at]
     lengths[h.side, target] = lengths[h.side, source]
     for at in range(lengths[h.side, source]):
         logs[h.side, target, at] = logs[h.side, source, at]

@@ -76,8 +76,8 @@ class Operators:
     def paper(cls) -> Operators:
         """Those of [PRP16] §2: crossover choice by choice, and mutation by small steps.
 
-        The paper prints no rates. With this rare mutation a population of 1,000 behaves as its §4
-        tells: it finds a plan in no time and, once converged, does not leave it.
+        The paper prints no rates. With this rare mutation a population of some thousands behaves
+        as its §4 tells: it finds a plan in no time and, once converged, does not leave it.
         """
         return cls(
             crossover=1.0,

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from compiler import equal_shares, maximal, minimal
 from compiler.advising import advise
+from compiler.baselines import divided
 from compiler.division import divide, expected_quality, moments_within, output_chances
 from compiler.explaining import explain
 from compiler.tables import Table
-from experiments.benchmarks.compiler import _mismatch, random_program
+from experiments.benchmarks.compiler_trees import mismatch, random_program
 
 SHAPES = {
     "one": ([],),
@@ -70,7 +71,7 @@ def total(tables) -> float:
 @pytest.mark.parametrize("shared", [False, True])
 def test_no_division_of_a_program_without_chance_beats_the_compiled_one(shared):
     rng = np.random.default_rng(11 + shared)
-    assert sum(_mismatch(random_program(rng, shared)) for _ in range(300)) == 0
+    assert sum(mismatch(random_program(rng, shared)) for _ in range(300)) == 0
 
 
 def test_a_result_of_quality_zero_is_not_mistaken_for_no_result():
@@ -87,7 +88,7 @@ def test_a_result_of_quality_zero_is_not_mistaken_for_no_result():
         Table("b", "b", ("a",), quality, times, fed, 1.0),
         Table("c", "c", ("b",), np.array([0.0, 0.9]), times, fed, 1.0),
     )
-    assert not _mismatch(tables)
+    assert not mismatch(tables)
     assert divide(tables).promise(3.0) == 0.9
 
 
@@ -148,6 +149,8 @@ def test_the_compiled_division_is_never_below_min_max_and_equal_shares(tables):
     frontier = divide(tables)
     budgets = np.linspace(0, 1.2 * total(tables), 80)
     promised = np.array([frontier.promise(budget) for budget in budgets])
+    by_tables = divided(tables, frontier, budgets)
+    assert (by_tables >= promised - 1e-8).all()
     for plain in (minimal, maximal, equal_shares):
         assert (promised >= plain(tables, budgets) - 1e-8).all(), plain.__name__
 

@@ -202,17 +202,21 @@ def test_help_imports_nothing_heavy():
     assert found.stdout.strip().endswith("[]"), found.stdout
 
 
-ROS = ("depot", "tb3_sandbox", "turtlebot3_world_map", "lse_arena")
-MOVINGAI = (
+MAPS = (
+    "ros/tb3_sandbox.yaml",
+    "ros/turtlebot3_world_map.yaml",
+    "ros/lse_arena.yaml",
     "dao/arena.map",
     "dao/den312d.map",
     "street/Berlin_1_256.map",
     "room/8room_000.map",
-    "bg512/AR0011SR.map",
 )
+FAR = [  # the missions of calibration are long there
+    pytest.param(name, marks=pytest.mark.slow) for name in ("ros/depot.yaml", "bg512/AR0011SR.map")
+]
 
 
-@pytest.mark.parametrize("name", [*(f"ros/{name}.yaml" for name in ROS), *MOVINGAI])
+@pytest.mark.parametrize("name", [*MAPS, *FAR])
 def test_missions_on_public_maps_end_with_an_ending_and_a_page(capsys, tmp_path, name):
     folder = map_folder()
     if folder is None:

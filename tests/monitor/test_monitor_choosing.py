@@ -8,7 +8,7 @@ import pytest
 from anytime import AnytimeError
 from experiments import shipped
 from monitor import Energy, Mission, State, Value
-from monitor.choosing import Chosen, choose_policy, tuned_division
+from monitor.choosing import Chosen, judge_policies, tuned_division
 from monitor.logs import write_log
 from monitor.policies import constant
 from monitor.robots.briefing import QUICK, brief
@@ -40,22 +40,23 @@ def log_of(report, folder):
 def test_the_best_on_held_out_missions_is_chosen_and_acts(briefing):
     shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
     policies = {"slow": constant(shares, 1.0), "brisk": constant(shares, 5.0)}
-    chosen = choose_policy(
+    verdict = judge_policies(
         briefing.program, MISSION, policies, None, briefing.robot, seeds=range(70, 73)
     )
-    assert chosen.name == "brisk"
-    assert np.mean(chosen.nets["brisk"]) > np.mean(chosen.nets["slow"])
+    assert verdict.name == "brisk"
+    assert np.mean(verdict.nets["brisk"]) > np.mean(verdict.nets["slow"])
+    chosen = Chosen(policies, verdict)
     asked = State("frame", 0.0, Situation(0.0, 40.0, 0.0), standing=True, route=40.0)
     assert chosen(asked).speed == 5.0
-    assert chosen(asked).why.net == pytest.approx(np.mean(chosen.nets["brisk"]))
+    assert chosen(asked).why.net == pytest.approx(np.mean(verdict.nets["brisk"]))
 
 
 def test_optimal_is_one_of_the_table_the_expectation_and_a_fixed_division(briefing):
     policy = briefing.monitor("optimal").policy
     assert isinstance(policy, Chosen)
     assert set(policy.policies) == {"table", "expected", "fixed"}
-    best = max(float(np.mean(nets)) for nets in policy.nets.values())
-    assert np.mean(policy.nets[policy.name]) == best
+    nets = policy.verdict.nets
+    assert np.mean(nets[policy.verdict.name]) == max(np.mean(each) for each in nets.values())
 
 
 def test_a_division_is_tuned_on_missions_that_were_lived_at_another_speed(briefing):

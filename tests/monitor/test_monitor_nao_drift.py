@@ -41,8 +41,8 @@ def surprise(report):
 
 def test_the_second_run_is_better_than_the_first():
     briefing = brief(problems=3)
-    surprises, switches = np.zeros((2, 10, 2))
-    for seed in range(10):
+    surprises, switches = np.zeros((2, 6, 2))
+    for seed in range(6):
         drift = None
         for run in range(2):
             scene = Scene(goal=Goal((1.0, 0.0)), seed=2 * seed + run)
@@ -55,7 +55,7 @@ def test_the_second_run_is_better_than_the_first():
         assert drift.mean == pytest.approx(0.13, abs=0.04)
     first, second = surprises.T
     assert second.mean() < 0.6 * first.mean()
-    assert (second < first).sum() >= 8
+    assert (second < first).sum() >= 5
     assert switches[:, 1].mean() < switches[:, 0].mean()
 
 
