@@ -175,7 +175,7 @@ class _Query:
                     self.cost = int(state[UPPER] - state[GAIN])
                 if exact:
                     self.least = max(self.least, int(state[CURRENT]) << int(state[SHIFT]))
-                elif left < 0:
+                elif scale is not None and left < 0:
                     scale, left = 1.25 * scale, patience
                     run.norm[:] = self._norm(scale)
                     improving.reweigh(self.grid.shape[1], self.goal, run)
