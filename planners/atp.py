@@ -27,7 +27,7 @@ from planners.norms import expected_norm, least_norm
 from planners.path_finding import Cell
 from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
-GRAIN = 1000
+GRAIN = 500
 """Expansions between two steps: a fraction of a millisecond."""
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
