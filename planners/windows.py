@@ -34,7 +34,7 @@ from planners.search import (
     WALL,
 )
 
-FRONTIER = "84699215c6e2"
+FRONTIER = "e939f8aacbfe"
 
 # numba compiles a callee once more for every literal argument; these are no literals.
 YES, ZERO, CHEAPEST, EXACT = np.bool_(True), np.int64(0), np.int64(1), np.int64(100)
