@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from anytime.command_line import (
 )
 from anytime.errors import AnytimeError
 
+RUNS = 30  # problems that are run, if nothing is said
+MOST = 2000  # with --until-regret
 CALIBRATION = 100  # problems among which known ones are sought
 
 
@@ -27,7 +30,13 @@ def declare(commands: Any) -> None:
     parser.add_argument("module", nargs="+", help="a registered name or FILE.py:NAME")
     _add_library(parser)
     parser.add_argument(
-        "--runs", type=natural, default=30, metavar="N", help="problems (default 30)"
+        "--runs", type=natural, metavar="N", help=f"problems, at most (default {RUNS}, or {MOST})"
+    )
+    parser.add_argument(
+        "--until-regret",
+        type=positive,
+        metavar="R",
+        help="end when no division of time is better than the compiled one by more than R",
     )
     parser.add_argument("--seconds", type=positive, default=1.0, help="of each run (default 1)")
     parser.add_argument("--problems", metavar="FILE.py:NAME", help="a function (rng) -> problems")
@@ -89,11 +98,13 @@ def profile(options: argparse.Namespace) -> Answer:
     from anytime import Module, ProfileLibrary, measure
     from anytime.programs import Program
 
-    if options.runs < 1:
-        raise AnytimeError(f"--runs {options.runs}: at least one problem is needed")
+    until_regret: float | None = options.until_regret
+    runs: int = (MOST if until_regret else RUNS) if options.runs is None else options.runs
+    if runs < 1:
+        raise AnytimeError(f"--runs {runs}: at least one problem is needed")
     kept: Path = options.library
     filled = ProfileLibrary(kept) if kept.is_dir() else ProfileLibrary()
-    left_out = 0
+    left_out, missed, told_of = 0, False, dict[str, Any]()
     for reference in options.module:
         what = resolve(reference)
         if not isinstance(what, Module | Program):
@@ -102,7 +113,7 @@ def profile(options: argparse.Namespace) -> Answer:
         name = options.problems or f"problems of {what.name}"
         try:
             made = source(np.random.default_rng(options.seed))
-            problems = list(itertools.islice(made, options.runs))
+            problems = list(itertools.islice(made, runs))
         except TypeError as error:
             raise AnytimeError(
                 f"{name}: {error}; give a function (rng) that returns or yields problems"
@@ -110,6 +121,7 @@ def profile(options: argparse.Namespace) -> Answer:
         store = kept / f"{what.name}.runs"
         if not options.resume:
             store.unlink(missing_ok=True)
+        until = until_regret and _until_regret(what, until_regret, options.seconds)
         with told() as warned, progress(f"measuring {what.name}") as report:
             measured = measure(
                 what,
@@ -119,12 +131,27 @@ def profile(options: argparse.Namespace) -> Answer:
                 executor=options.executor,
                 store=store,
                 progress=report,
+                until=until or None,
             )
+        if until:
+            print(f"anytime: {what.name}: {until!r}", file=sys.stderr)
+            told_of |= {"problems": until.problems, "regret": until.bound, "left": until.left}
+            missed |= until.left > 0
         left_out += sum("is left out" in line for line in warned)
         filled = filled.updated(measured)
     filled.save(kept)
-    data = {"library": str(kept), "modules": list(filled), "problems": options.runs}
-    return Answer(repr(filled), {**data, "left_out": left_out}, int(left_out > 0))
+    data = {"library": str(kept), "modules": list(filled), "problems": runs, **told_of}
+    return Answer(repr(filled), {**data, "left_out": left_out}, int(left_out > 0 or missed))
+
+
+def _until_regret(what: Any, wanted: float, seconds: float) -> Any:
+    """The rule that the compiler brings: this layer does not know it."""
+    from anytime import plugins
+    from anytime.programs import program_of
+
+    point = plugins.registered("anytime.endings")["regret"]
+    program = what if hasattr(what, "output") else program_of(what)
+    return plugins.load(point)(program, wanted, seconds)
 
 
 def calibrate(options: argparse.Namespace) -> Answer:

@@ -26,6 +26,8 @@ from anytime.profiles import Profile
 from anytime.programs import Program, program_of, upstream
 from anytime.sampling import How, sampled
 
+FIRST_LOOK = 20  # problems after which it is first asked whether they are enough
+
 
 def measure(
     what: Module | Program,
@@ -38,6 +40,7 @@ def measure(
     executor: Executor | str | None = None,
     store: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
+    until: Callable[[ProfileLibrary], bool] | None = None,
 ) -> ProfileLibrary:
     """Measure how the results of a module, or of each module of a program, improve with time.
 
@@ -51,8 +54,10 @@ def measure(
     executor: where runs are made, `"processes:4"`, `"dask://127.0.0.1:8786"` or any executor of
     yours; modules travel by their names, and what cannot travel is measured here, with a warning
     that says why. store: a file that each problem's runs are added to as they come; what it holds
-    already is not run again. With either, a problem that fails, or kills its worker twice, is left
-    out with a warning; without them the first that fails is raised.
+    already is not run again. until: asked now and then, with the profiles so far, whether that is
+    enough (`compiler.UntilRegret`); then no more problems are begun. With any of them, a problem
+    that fails, or kills its worker twice, is left out with a warning; without them the first that
+    fails is raised.
 
     In a program, what each module really delivers feeds the next: at most `STRATA` runs a call
     and problem, on results equally spaced in achieved quality plus the last; of several inputs,
@@ -74,12 +79,15 @@ def measure(
     keys = problem_keys(program, listed)
     named = dict(zip(keys, listed, strict=True))
     how = How(seconds, clock, rest, seed)
-    if executor is None and store is None:
-        found = _one_by_one(program, named, how, progress)
-    else:
-        found = _campaign(program, named, how, executor or "serial", store, progress)
     made = clock()
     known = made.machine if isinstance(made, WorkClock) else None
+    if executor is None and store is None and until is None:
+        found = _one_by_one(program, named, how, progress)
+    else:
+        watch = None
+        if until is not None:
+            watch = _Watch(keys, lambda good: until(_library(program, good, known)))
+        found = _campaign(program, named, how, executor or "serial", store, progress, watch)
     return _library(program, found, known)
 
 
@@ -105,8 +113,10 @@ def _campaign(
     executor: Executor | str,
     path: Path | None,
     progress: Callable[[int, int], None] | None,
+    watch: _Watch | None,
 ) -> list[Outcome]:
-    """Outcomes of all problems but those that fail, in the order of the problems."""
+    """Outcomes of all problems but those that fail, in the order of the problems; up to where the
+    watch has seen enough."""
     make = executors.maker(executor) if isinstance(executor, str) else executors.lent(executor)
     with nullcontext() if path is None else opened(path, _described(program, how)) as store:
         found = {key: o for key, o in store.kept.items() if key in problems} if store else {}
@@ -117,16 +127,55 @@ def _campaign(
                 store.append(outcome)
             if progress is not None:
                 progress(len(found), len(problems))
+            if watch is not None:
+                watch.look(found)
 
         left = {key: problem for key, problem in problems.items() if key not in found}
-        lived(program, left, how, make, keep)
+        used = list(problems)
+        try:
+            if watch is not None:
+                watch.look(found)
+            lived(program, left, how, make, keep)
+        except _EnoughError:
+            used = used[: watch.seen] if watch else used
     for outcome in found.values():
         if outcome.failed is not None:
             warnings.warn(f"problem {outcome.problem} is left out: {outcome.failed}", stacklevel=3)
-    good = [found[key] for key in problems if found[key].failed is None]
+    good = [found[key] for key in used if found[key].failed is None]
     if not good:
         raise AnytimeError(f"every problem failed: {next(iter(found.values())).failed}")
     return good
+
+
+class _EnoughError(Exception):
+    """Ends a campaign."""
+
+
+class _Watch:
+    """Asks whether the problems so far are enough, at numbers of them that grow by a quarter.
+
+    Problems count in their own order and not as they come, for quick ones come first; so the same
+    ones are used wherever they are run.
+    """
+
+    def __init__(self, keys: Sequence[str], enough: Callable[[Sequence[Outcome]], bool]) -> None:
+        self._keys, self._enough = keys, enough
+        self._good: list[Outcome] = []
+        self._next = FIRST_LOOK
+        self.seen = 0
+
+    def look(self, found: Mapping[str, Outcome]) -> None:
+        """Raises _EnoughError when the first `seen` problems are enough."""
+        while self.seen < len(self._keys) and self._keys[self.seen] in found:
+            outcome = found[self._keys[self.seen]]
+            self.seen += 1
+            if outcome.failed is not None:
+                continue
+            self._good.append(outcome)
+            if len(self._good) == self._next:
+                self._next += -(-self._next // 4)
+                if self._enough(self._good):
+                    raise _EnoughError
 
 
 def _described(program: Program, how: How) -> Campaign:

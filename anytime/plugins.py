@@ -1,4 +1,4 @@
-"""What other packages add by entry points: modules, commands, drawings."""
+"""What other packages add by entry points: modules, commands, drawings, endings of campaigns."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from anytime.errors import AnytimeError
 
-GROUPS = ("anytime.commands", "anytime.drawings", "anytime.modules")
+GROUPS = ("anytime.commands", "anytime.drawings", "anytime.endings", "anytime.modules")
 
 
 def registered(group: str) -> dict[str, EntryPoint]:

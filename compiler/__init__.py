@@ -5,6 +5,7 @@ from compiler.baselines import equal_shares, maximal, minimal
 from compiler.compiled import CompiledProgram
 from compiler.compiling import compile
 from compiler.constructs import all_of, any_of, branch, choose, loop, output, parallel
+from compiler.enough import UntilRegret
 from compiler.interruption import Interruptible, interruptible
 from compiler.loading import load
 from compiler.objectives import at_least, cvar, expected, quantile
@@ -15,6 +16,7 @@ __all__ = [
     "Activity",
     "CompiledProgram",
     "Interruptible",
+    "UntilRegret",
     "all_of",
     "any_of",
     "at_least",
