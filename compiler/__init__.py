@@ -11,8 +11,10 @@ from compiler.loading import load
 from compiler.objectives import at_least, cvar, expected, quantile
 from compiler.processors import round_robin
 from compiler.reading import program
+from compiler.shadowing import advise
 
 __all__ = [
+    "advise",
     "Activity",
     "CompiledProgram",
     "Interruptible",

@@ -104,7 +104,9 @@ class Replay:
             delivered[call.label] = records.qualities[problem, run, at]
             spent = np.where(alive, records.seconds[problem, run, at], 0.0)
             complete = (count == counts) & np.isfinite(records.ends[problem, run])
-            spent = np.where(complete, np.maximum(records.ends[problem, run], spent), spent)
+            # What it does after its last result, the guard ends with its share.
+            most = np.maximum(share_end - now, spent)
+            spent = np.where(complete, np.clip(records.ends[problem, run], spent, most), spent)
             if call.module.contract:
                 spent = np.maximum(spent, np.minimum(share_end - now, spent * 2))
             now = now + spent

@@ -1,0 +1,185 @@
+"""A shadow changes nothing and records what it saw."""
+
+import inspect
+import threading
+from types import SimpleNamespace
+
+import pytest
+
+from anytime import AnytimeError, Machine, WorkClock
+from anytime.shadow import FRAMES, Shadow
+from anytime.shadowed import shadowed
+
+
+@pytest.fixture
+def system():
+    """A loop of three functions on a clock of its own."""
+    clock = WorkClock(Machine("test"))
+    shadow = Shadow(clock)
+
+    def see(image, *, sizes=(1, 2, 4)):
+        for size in sizes:
+            clock.advance(0.01 * size)
+            yield [1 - image / size]
+
+    def find(boxes, start=0):
+        """Finds."""
+        for cost in 3.0, 2.0, 1.5:
+            clock.advance(0.02)
+            shadow.register(cost)
+        return (boxes, 1.5)
+
+    def fail(how):
+        raise how
+
+    watched = SimpleNamespace(
+        see=shadow.watch(see, quality=lambda boxes: boxes[0]),
+        find=shadow.watch(find, cost=lambda found: found if isinstance(found, float) else found[1]),
+        fail=shadow.watch(fail),
+    )
+
+    @shadow.frame
+    def step(image):
+        last = None
+        for boxes in watched.see(image):
+            clock.advance(100.0)  # what happens between results is not the function's time
+            last = boxes
+        return watched.find(last)
+
+    plain = SimpleNamespace(see=see, find=find, fail=fail)
+    return SimpleNamespace(shadow=shadow, clock=clock, step=step, plain=plain, **vars(watched))
+
+
+def test_results_exceptions_and_signatures_are_what_they_were(system):
+    assert list(system.see(0.5)) == list(system.plain.see(0.5))
+    assert system.find([1.0], start=3) == system.plain.find([1.0])
+    assert system.find.__doc__ == "Finds."
+    for name in "see", "find", "fail":
+        plain, watched = getattr(system.plain, name), getattr(system, name)
+        assert inspect.signature(plain) == inspect.signature(watched)
+        assert inspect.isgeneratorfunction(plain) == inspect.isgeneratorfunction(watched)
+    error = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt) as caught:
+        system.shadow.frame(system.fail)(error)
+    assert caught.value is error
+    with pytest.raises(TypeError, match=r"find\(\) got an unexpected"):
+        system.shadow.frame(lambda: system.find(wrong=1))()
+
+
+def test_a_generator_is_sent_thrown_into_and_closed_as_ever():
+    shadow, told = Shadow(), []
+
+    def talk():
+        try:
+            told.append((yield 0.1))
+            yield 0.2
+        except ValueError as error:
+            told.append(error)
+            yield 0.3
+        finally:
+            told.append("closed")
+        return "done"
+
+    @shadow.frame
+    def frame():
+        talking = shadow.watch(talk, quality=float)()
+        error = ValueError()
+        assert (next(talking), talking.send("hello"), talking.throw(error)) == (0.1, 0.2, 0.3)
+        with pytest.raises(StopIteration) as stopped:
+            next(talking)
+        assert told == ["hello", error, "closed"]
+        return stopped.value.value
+
+    assert frame() == "done"
+    assert shadow.frames[0].calls["talk"].scores == [0.1, 0.2, 0.3]
+    assert shadow.frames[0].calls["talk"].complete
+
+
+def test_times_scores_and_what_went_where_are_recorded_and_no_result_is_kept(system):
+    system.step(0.5)
+    (frame,) = system.shadow.frames
+    see, find = frame.calls["see"], frame.calls["find"]
+    assert see.seconds == pytest.approx([0.01, 0.03, 0.07])
+    assert see.scores == [0.5, 0.75, 0.875]
+    assert find.seconds == pytest.approx([0.02, 0.04, 0.06, 0.06])
+    assert find.fed == {"boxes": ("see", 2)}
+    assert not frame.made
+
+
+def test_a_score_that_fails_or_is_none_goes_no_further(system):
+    bad = system.shadow.watch(lambda: 7, quality=lambda value: 1 / 0)
+    worse = system.shadow.watch(abs, quality=lambda value: value)
+    assert system.shadow.frame(lambda: (bad(), worse(-7)))() == (7, 7)
+    assert system.shadow.odd["abs with a score that is none"] == 1
+
+
+def test_threads_have_frames_of_their_own(system):
+    threads = [threading.Thread(target=system.step, args=(0.1,)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(system.shadow.frames) == 8
+    assert all(list(frame.calls) == ["see", "find"] for frame in system.shadow.frames)
+
+
+def test_the_memory_of_a_shadow_is_bounded(system):
+    turn = system.shadow.frame(lambda: None)
+    for _ in range(FRAMES + 100):
+        turn()
+    assert len(system.shadow.frames) == FRAMES
+    assert system.shadow.count == FRAMES + 100
+
+
+def test_what_cannot_be_watched_is_refused(system):
+    async def later(): ...
+
+    with pytest.raises(AnytimeError, match="give a function or generator function"):
+        system.shadow.watch(later)
+    with pytest.raises(AnytimeError, match="'see' is watched already"):
+        system.shadow.watch(system.plain.see)
+    with pytest.raises(AnytimeError, match="0 frames with watched calls; 20 are needed"):
+        shadowed(system.shadow)
+
+
+def test_a_program_is_read_off_what_went_where(system):
+    for number in range(30):
+        system.step(number / 30)
+        system.see(0.3)
+    seen = shadowed(system.shadow)
+    assert (
+        repr(seen.program) == "program shadow(image, sizes, start) = find(see(image, sizes), start)"
+    )
+    assert len(seen.frames) == 30
+    assert seen.library(cautious=False)["find"].inputs == ("boxes",)
+    cautious = seen.library(cautious=True)["find"]
+    assert not cautious.given(boxes=0.0).mean(1.0).any()
+    assert cautious.given(boxes=1.0).mean(1.0) == pytest.approx(1.0)
+
+
+def test_frames_in_which_a_call_was_missing_are_told(system):
+    for number in range(60):
+        system.step(number / 60) if number % 2 else system.shadow.frame(
+            lambda: list(system.see(0.5))
+        )()
+    assert any(
+        "the 30 of 60 frames in which a call" in line for line in shadowed(system.shadow).unknown
+    )
+
+
+@pytest.mark.parametrize(
+    ("budget", "expected"),
+    [
+        (lambda number: 1.0, "sleep has no curve: it was only ever told one time"),
+        (lambda number: 1.0 + number % 3, "each was seen at one of 3 times"),
+    ],
+)
+def test_a_contract_function_that_was_only_told_one_time_has_no_curve(system, budget, expected):
+    def sleep(start, seconds):
+        system.clock.advance(seconds)
+        return start
+
+    turn = system.shadow.frame(system.shadow.watch(sleep, quality=lambda value: 0.5))
+    for number in range(30):
+        turn(number, seconds=budget(number))
+    assert any(expected in line for line in shadowed(system.shadow).unknown)
