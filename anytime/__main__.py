@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Sequence
 
 from anytime import plugins
-from anytime.command_line import Parser, as_json
+from anytime.command_line import Parser, as_json, told
 from anytime.errors import AnytimeError
 
 
@@ -25,11 +25,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             plugins.load(point).declare(commands)
         except Exception as error:  # a third party's broken command must not break ours
-            told = f"commands of {plugins.origin(point)} are left out: {error}"
-            print(f"anytime: {told}".replace("\n", " "), file=sys.stderr)
+            broken = f"commands of {plugins.origin(point)} are left out: {error}"
+            print(f"anytime: {broken}".replace("\n", " "), file=sys.stderr)
     options = parser.parse_args(arguments)
     try:
-        answer = options.run(options)
+        with told():
+            answer = options.run(options)
         print(as_json(answer.data) if options.json else answer.text, flush=True)
     except AnytimeError as error:
         print(f"anytime: {error}".replace("\n", " "), file=sys.stderr)

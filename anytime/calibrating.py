@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from anytime.clocks import Clock, WallClock
+from anytime.clocks import Clock, WallClock, WorkClock
 from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
-from anytime.machines import Machine, Rate
+from anytime.machines import Machine, Rate, processor
 from anytime.measuring import problem_keys
 from anytime.modules import Module
 from anytime.outcomes import Outcome
@@ -96,7 +96,8 @@ def calibrate(
         for each in made
         if each.module in library.machine.rates
     }
-    here = ProfileLibrary(profiles=moved, machine=Machine(machine, rates))
+    host = "" if isinstance(clock(), WorkClock) else processor()
+    here = ProfileLibrary(profiles=moved, machine=Machine(machine, rates, host))
     return Calibration(machine, made, library.updated(here))
 
 
@@ -212,7 +213,7 @@ def _moved(profile: Profile, here: Calibrated, machine: str) -> Profile:
             replace(run, seconds=run.seconds * ratio, end=(run.end[0] * ratio, run.end[1]))
             for run in members
         ]
-    return replace(profile, recordings=tuple(runs), machine=machine)
+    return replace(profile, recordings=tuple(runs), machine=machine, unsure=1.0)
 
 
 def _scaled(rate: Rate, ratio: float) -> Rate:

@@ -15,6 +15,7 @@ from anytime.command_line import (
     positive,
     progress,
     resolve,
+    target,
     told,
 )
 from anytime.errors import AnytimeError
@@ -53,6 +54,9 @@ def declare(commands: Any) -> None:
     parser = add_command(commands, "library", library, "show the profiles of a library")
     parser.add_argument("action", nargs="?", choices=["check"], help="only check the files")
     _add_library(parser)
+    parser.add_argument(
+        "--ompl", type=target, metavar="FILE", help="write the runs as a log of OMPL's benchmarks"
+    )
     parser = add_command(
         commands, "calibrate", calibrate, "move a library to this machine, by a few runs"
     )
@@ -210,10 +214,14 @@ def _problems(what: Any) -> Any:
 
 
 def library(options: argparse.Namespace) -> Answer:
-    """Show what a library holds, or check that every file of it is whole."""
+    """Show what a library holds, check that every file of it is whole, or write it for OMPL."""
     from anytime import ProfileLibrary
 
     found = ProfileLibrary(options.library)
+    if options.ompl is not None:
+        from anytime.ompl_log import write_ompl_log
+
+        write_ompl_log(found, options.ompl)
     text = f"{len(found)} profiles are whole" if options.action else repr(found)
     return Answer(text, {"modules": list(found), "machine": found.machine.name})
 

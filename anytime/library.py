@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,19 +13,21 @@ import numpy as np
 
 from anytime.errors import AnytimeError
 from anytime.files import Stored, read_record, write_record
-from anytime.machines import Machine, Rate
+from anytime.machines import Machine, Rate, processor
 from anytime.pictures import figure
 from anytime.profiles import Profile, Recording
 
 PROFILE = "anytime.profile/1"
 MACHINE = "anytime.machine/1"
+UNSURE = 2.0  # times as fast or slow as where it was measured that a machine may be
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,99}(@[A-Za-z0-9_.=,-]{1,99})?")
 
 
 class ProfileLibrary(Mapping[str, Profile]):
     """The profiles of some modules [ZR93 §1], kept in a folder with the machine's rates.
 
-    `ProfileLibrary("profiles")` reads a folder; `save` writes one, each file as a whole.
+    `ProfileLibrary("profiles")` reads a folder; `save` writes one, each file as a whole. A folder
+    that was measured on another kind of processor is read with a warning and with wider bands.
     """
 
     def __init__(
@@ -59,7 +63,11 @@ class ProfileLibrary(Mapping[str, Profile]):
 
     def updated(self, other: ProfileLibrary) -> ProfileLibrary:
         """This library with the profiles and rates of another one added or replaced."""
-        machine = Machine(other.machine.name, {**self.machine.rates, **other.machine.rates})
+        rates = {**self.machine.rates, **other.machine.rates}
+        known = (self.machine.host, other.machine.host)
+        # Seconds of two kinds of machine in one folder: the doubt stays.
+        mixed = all(known) and not set(self._profiles) <= set(other._profiles)
+        machine = Machine(other.machine.name, rates, known[0] if mixed else known[1])
         return ProfileLibrary(profiles={**self._profiles, **other._profiles}, machine=machine)
 
     def save(self, folder: str | Path) -> None:
@@ -84,6 +92,20 @@ class ProfileLibrary(Mapping[str, Profile]):
             self._profiles[profile.module] = profile
         if (root / "machine.json").exists():
             self.machine = read_machine(root / "machine.json")
+            self._doubt(root)
+
+    def _doubt(self, root: Path) -> None:
+        """Widen the bands of what was measured in the seconds of another kind of machine."""
+        host = self.machine.host
+        if not host or host == processor():
+            return
+        warnings.warn(
+            f"{root}: its seconds are those of {host}, not of this machine; bands are widened to "
+            f"{UNSURE:g} times as fast or slow, until `anytime calibrate`",
+            stacklevel=4,
+        )
+        doubted = {name: replace(each, unsure=UNSURE) for name, each in self._profiles.items()}
+        self._profiles = doubted
 
     def __repr__(self) -> str:
         count = f"{len(self)} profile{'s' if len(self) != 1 else ''}"
@@ -126,6 +148,7 @@ class _Rate(Stored):
 class _Machine(Stored):
     name: str
     rates: dict[str, _Rate]
+    host: str = ""
 
 
 def _checked(name: str) -> str:
@@ -224,7 +247,7 @@ def _store_machine(machine: Machine) -> _Machine:
         )
         for name, rate in machine.rates.items()
     }
-    return _Machine(name=machine.name, rates=rates)
+    return _Machine(name=machine.name, rates=rates, host=machine.host)
 
 
 def write_machine(path: Path, machine: Machine) -> None:
@@ -242,4 +265,4 @@ def read_machine(path: Path) -> Machine:
         name: Rate(rate.per_work, tuple(rate.per_step), rate.p95_over_mean, rate.steps)
         for name, rate in stored.rates.items()
     }
-    return Machine(stored.name, rates)
+    return Machine(stored.name, rates, stored.host)

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
+import platform
+import re
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +49,15 @@ class Rate:
 
 @dataclass(frozen=True)
 class Machine:
-    """The speeds of one machine, module by module."""
+    """The speeds of one machine, module by module.
+
+    host: the kind of processor that they were measured on in real time, see `processor`; empty for
+    simulated time.
+    """
 
     name: str
     rates: Mapping[str, Rate] = field(default_factory=dict[str, Rate])
+    host: str = ""
 
     def rate(self, module: str) -> Rate | None:
         """The rate of a module; of one with set knobs its own, or that of all its settings."""
@@ -84,7 +94,8 @@ class Machine:
             raise AnytimeError(
                 f"rate of {module!r} is {seconds_per_work}; give finite seconds per unit of work"
             )
-        return Machine(self.name, {**self.rates, module: Rate(per_work=seconds_per_work)})
+        rates = {**self.rates, module: Rate(per_work=seconds_per_work)}
+        return Machine(self.name, rates, self.host)
 
     def __repr__(self) -> str:
         lines = [f"machine {self.name}"]
@@ -98,6 +109,16 @@ class Machine:
             else:
                 lines.append(f"  {module:<24.24} {1e3 * rate.per_work:.4g} ms a unit of work")
         return "\n".join(lines)
+
+
+def processor() -> str:
+    """The kind and number of this machine's processors: what its speed depends on most."""
+    kind = platform.processor() or platform.machine()
+    with contextlib.suppress(OSError):  # only Linux says which model it is
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        named = re.search(r"^model name\s*:\s*(.+)$", text, flags=re.MULTILINE)
+        kind = " ".join(named[1].split()) if named else kind
+    return f"{kind} × {os.cpu_count()}"
 
 
 def charged_rate(samples: Iterable[tuple[float, float]]) -> Rate:

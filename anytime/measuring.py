@@ -19,7 +19,7 @@ from anytime.campaigns import lived
 from anytime.clocks import Clock, WallClock, WorkClock
 from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
-from anytime.machines import Machine, Rate, charged_rate, stepped_rate
+from anytime.machines import Machine, Rate, charged_rate, processor, stepped_rate
 from anytime.modules import Module
 from anytime.outcomes import Campaign, Outcome, Pace, opened
 from anytime.profiles import Profile
@@ -208,7 +208,7 @@ def _library(
             here = machine.name if machine else "this"
             profiles[name] = Profile(name, tuple(feeding), tuple(recordings), best, here)
         rates[name] = _rate([pace for outcome in outcomes for pace in outcome.paces[name]])
-    return ProfileLibrary(profiles=profiles, machine=machine or Machine("this", rates))
+    return ProfileLibrary(profiles=profiles, machine=machine or Machine("this", rates, processor()))
 
 
 def _rate(paces: Sequence[Pace]) -> Rate:

@@ -82,6 +82,8 @@ class Profile:
     on the quality at the parameter `boxes`: each problem's runs are interpolated over the input
     quality and then problems are averaged, because good inputs and easy problems come together.
     *No result* is a level of its own and is never extrapolated to. [ZR93] §3.5.
+
+    unsure: this machine may be so many times as fast or slow as where it was measured.
     """
 
     module: str
@@ -90,6 +92,7 @@ class Profile:
     references: Mapping[str, float] = field(default_factory=dict[str, float])
     machine: str = "this"
     condition: Mapping[str, float] = field(default_factory=dict[str, float])
+    unsure: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.recordings:
@@ -293,9 +296,14 @@ class Profile:
     ) -> tuple[Floats, Floats]:
         """A band around the mean, simultaneous over the times: (low [times], high [times]).
 
-        Cluster bootstrap over problems, studentised by the largest deviation (sup-t).
+        Cluster bootstrap over problems, studentised by the largest deviation (sup-t). Where it is
+        unsure how fast this machine is, from the lower end when it is slow to the upper when fast.
         """
         times = np.atleast_1d(np.asarray(seconds, dtype=float))
+        if self.unsure > 1.0:
+            here = replace(self, unsure=1.0)
+            low, _ = here.band(times / self.unsure, confidence, resamples)
+            return low, here.band(times * self.unsure, confidence, resamples)[1]
         table = self.weights[:, None] * np.nan_to_num(self.quality_at(times))
         index = {problem: row for row, problem in enumerate(self.problems)}
         rows = np.array([index[run.problem] for run in self.recordings])
@@ -326,7 +334,7 @@ class Profile:
             )
             for run in self.recordings
         )
-        return replace(self, recordings=moved, machine=machine.name)
+        return replace(self, recordings=moved, machine=machine.name, unsure=1.0)
 
     # Pictures
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from anytime import AnytimeError, Machine, Profile, ProfileLibrary
 from anytime.files import checksum, write_atomically
 from anytime.library import read_machine, read_profile, write_machine
-from anytime.machines import Rate
+from anytime.machines import Rate, processor
 from anytime.profiles import Recording
 
 
@@ -330,3 +330,38 @@ def test_a_negative_rate_is_refused(tmp_path, field):
     rewritten(path, content)
     with pytest.raises(AnytimeError, match=r"rates\.see has a negative number"):
         read_machine(path)
+
+
+def test_a_library_of_another_kind_of_machine_warns_and_has_wider_bands(tmp_path):
+    elsewhere = Machine("this", {}, "A Fast Processor × 64")
+    known = small()
+    ProfileLibrary(profiles={known.module: known}, machine=elsewhere).save(tmp_path)
+    with pytest.warns(
+        UserWarning, match=r"are those of A Fast Processor × 64, .*calibrate"
+    ) as told:
+        there = ProfileLibrary(tmp_path)[known.module]
+    assert len(told) == 1
+    assert "\n" not in str(told[0].message)
+    times = np.linspace(0, 4 * known.times[-1], 50)
+    low, high = there.band(times)
+    sure_low, sure_high = known.band(times)
+    assert (low <= sure_low + 1e-9).all()
+    assert (high >= sure_high - 1e-9).all()
+    assert (high - low).sum() > (sure_high - sure_low).sum()
+    assert there.on(Machine("mine").with_rate(known.module, 0.1)).unsure == 1.0
+
+
+def test_a_library_of_this_kind_of_machine_or_of_simulated_time_is_trusted(tmp_path, recwarn):
+    for host in ("", processor()):
+        machine = Machine("this", {}, host)
+        ProfileLibrary(profiles={"find": small()}, machine=machine).save(tmp_path)
+        assert ProfileLibrary(tmp_path)["find"].unsure == 1.0
+        assert ProfileLibrary(tmp_path).machine.host == host
+    assert not recwarn.list
+
+
+def test_a_folder_that_mixes_machines_keeps_its_doubt():
+    here = ProfileLibrary(profiles={"path": small()}, machine=Machine("this", {}, "here"))
+    there = ProfileLibrary(profiles={"find": small()}, machine=Machine("this", {}, "there"))
+    assert there.updated(here).machine.host == "there"
+    assert ProfileLibrary().updated(here).machine.host == "here"
