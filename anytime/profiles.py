@@ -297,13 +297,14 @@ class Profile:
         """A band around the mean, simultaneous over the times: (low [times], high [times]).
 
         Cluster bootstrap over problems, studentised by the largest deviation (sup-t). Where it is
-        unsure how fast this machine is, from the lower end when it is slow to the upper when fast.
+        unsure how fast this machine is, all that it is when slow, as fast and when fast.
         """
         times = np.atleast_1d(np.asarray(seconds, dtype=float))
         if self.unsure > 1.0:
+            speeds = (1 / self.unsure, 1.0, self.unsure)
             here = replace(self, unsure=1.0)
-            low, _ = here.band(times / self.unsure, confidence, resamples)
-            return low, here.band(times * self.unsure, confidence, resamples)[1]
+            ends = np.array([here.band(times * each, confidence, resamples) for each in speeds])
+            return ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
         table = self.weights[:, None] * np.nan_to_num(self.quality_at(times))
         index = {problem: row for row, problem in enumerate(self.problems)}
         rows = np.array([index[run.problem] for run in self.recordings])
