@@ -22,6 +22,7 @@ from anytime.programs import Call, Input, Join, Program, makers, upstream
 from anytime.results import Change, Result
 from anytime.running import Run, execute, seed_of
 from anytime.structure import answers
+from anytime.thinning import Thinned
 
 STRATA = 4  # qualities of an input that a consumer is run on, on one problem
 COMBINATIONS = 9  # of several inputs that it is run on, at most
@@ -134,19 +135,13 @@ def _sample(
     levels = tuple(index for *_, index in fed)
 
     def once(budget: float) -> tuple[list[tuple[Any, Change]], Result, Run]:
-        kept: list[tuple[Any, Change]] = []
-
-        def observe(value: Any, change: Change) -> None:
-            kept.append((value, change))
-            if len(kept) >= 4 * CHANGES:  # bounds the memory of a module that registers for ever
-                del kept[1:-1:2]
-
+        results = Thinned(4 * CHANGES)
         if how.rest:  # even a sleep of 0 s gives the processor away
             time.sleep(how.rest)
         rng = np.random.default_rng(seed_of(how.seed, call.label, key, levels))
         deadline = Deadline.after(budget, how.clock())
-        result, run = execute(module, inputs, deadline, rng=rng, observe=observe)
-        return kept, result, run
+        result, run = execute(module, inputs, deadline, rng=rng, observe=results.add)
+        return results.kept, result, run
 
     kept, result, run = once(how.seconds)
     if run.mixed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -396,3 +397,20 @@ def test_a_score_may_take_the_result_alone():
     one = measured(anytime.module(quality=lambda v: v / 2, name="see")(ladder), problems(2))
     two = measured(see, problems(2))
     assert repr(one["see"].recordings) == repr(two["see"].recordings)
+
+
+def test_of_many_results_those_at_equal_distances_are_kept_and_the_last():
+    @anytime.module(quality=lambda value: value)
+    def long(start):
+        for step in range(1500):
+            anytime.charge(1)
+            yield start + step / 1500
+
+    machine = Machine("m").with_rate("long", 0.001)
+    problems = [SimpleNamespace(start=0.0)]
+    library = anytime.measure(long, problems, seconds=2.0, clock=lambda: WorkClock(machine))
+    (run,) = library["long"].recordings
+    apart = np.diff(run.work)
+    assert len(run.work) == CHANGES
+    assert apart.max() <= 3 * apart.min()
+    assert run.work[[0, -1]].tolist() == [1.0, 1500.0]

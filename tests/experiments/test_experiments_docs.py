@@ -23,6 +23,14 @@ def shape(text: str) -> list[list[str]]:
     return [line.split() for line in plain.strip().splitlines()]
 
 
+def alike(drawn: str, shown: str) -> bool:
+    """Whether two pictures differ by rounding at most: by two of their points anywhere."""
+    number = r"-?\d+\.?\d*"
+    places = [[float(each) for each in re.findall(number, svg)] for svg in (drawn, shown)]
+    same = re.sub(number, "#", drawn) == re.sub(number, "#", shown)
+    return same and all(abs(a - b) <= 2 for a, b in zip(*places, strict=True))
+
+
 def has_what_it_needs(block: str) -> bool:
     """Whether the package is installed that a block needs by its first line, `# needs NAME`."""
     needed = re.match(r"# needs (\w+)\n", block)
@@ -51,6 +59,8 @@ def test_page_runs_from_top_to_bottom_and_prints_what_it_shows(page, tmp_path, m
             assert shape(printed) == shape(block), printed
         elif language == "toml" and block.startswith("# "):
             (tmp_path / block.splitlines()[0].removeprefix("# ")).write_text(block)
+    for drawn in tmp_path.glob("gallery-*.svg"):
+        assert alike(drawn.read_text(), (page.parent / "figures" / drawn.name).read_text()), drawn
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
