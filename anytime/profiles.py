@@ -15,6 +15,7 @@ from anytime.pictures import duration, figure, line_chart, number, sparkline
 from anytime.strata import stratum_weights
 
 Floats = NDArray[np.float64]
+FALLS = 0.05  # of expected quality from its best moment to the end of the runs, which is told
 
 
 @dataclass(frozen=True)
@@ -346,8 +347,11 @@ class Profile:
         times = np.linspace(0, self._horizon(), 16)
         means = self.mean(times)
         first = self.time_to(1e-9)
+        best, end = float(means[-1]), float(self.mean(times[-1], as_measured=True)[0])
+        # Results that get worse are worth a look: often an unfinished one costs too little.
+        falls = f" then {number(end)}" if best - end > FALLS else ""
         parts = [
-            f"{self.module}  {sparkline(means.tolist())}  q {number(float(means[-1]))} "
+            f"{self.module}  {sparkline(means.tolist())}  q {number(best)}{falls} "
             f"in {duration(self._horizon())}, first {duration(first)}"
         ]
         if self.condition:

@@ -31,7 +31,7 @@ class Table:
     levels: [L] representative quality of each output level; levels[0] = 0 is "no result".
     times: [M] seconds, increasing, times[0] = 0.
     chances: [L_1, …, L_k, M, L] probability of each output level.
-    first: seconds by which half of the runs have a first result.
+    first: seconds by which half of the runs on the most suitable inputs have a first result.
     path: the arms of branches and parallels that the call stands in, from the outermost in.
     rule: of a join, which takes no time; None for a call.
     """
@@ -179,10 +179,19 @@ def _table(
     chances[..., 0] = 1.0  # no input, no result
     filled = (slice(1, None),) * len(sources)
     chances[filled] = known.reshape(*(size - 1 for size in shape), len(times), len(levels))
-    # Ta of [ZR93] §2, moved up to one of the moments.
-    first = float(times[min(int(np.searchsorted(times, profile.time_to(0.0))), len(times) - 1)])
+    first = _first(times, 1.0 - known[..., 0])
     feeds, chances = _once_each(tuple(s.label for s in feeding.values()), chances)
     return Table(call.label, name, feeds, levels, times, chances, first)
+
+
+def _first(times: Floats, there: Floats) -> float:
+    """Ta of [ZR93] §2 on the inputs that suit the module best: others may never give it a result,
+    and whoever waits for that gives the modules before it no time.
+
+    there: chances of a result by inputs and time, [n, times].
+    """
+    best = there.max(axis=0)
+    return float(times[int(np.argmax(best >= min(0.5, best[-1]) - 1e-12))])
 
 
 def _scale(profile: Profile, counts: Mapping[str, float] | None) -> Floats:
