@@ -314,13 +314,9 @@ def take_up(cost, wall, columns, start, diagonals, run):
     node, count, rest = run.state[MEETING], run.state[COUNT], 0
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
     run.state[MEETING] = NOTHING
-    if count == 0 or node == run.path[count - 1]:
-        run.path[: beginning.size] = beginning
-        run.state[COUNT] = beginning.size
-    else:
-        while run.path[rest] != node:
-            rest += 1
-        _replace(run, 0, rest, beginning)
+    while rest < count and run.path[rest] != node:
+        rest += 1
+    _replace(run, 0, min(rest, count - 1), beginning)
     return way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
 
 
