@@ -125,7 +125,7 @@ def profile(options: argparse.Namespace) -> Answer:
         store = kept / f"{what.name}.runs"
         if not options.resume:
             store.unlink(missing_ok=True)
-        until = until_regret and _until_regret(what, until_regret, options.seconds)
+        until = _until_regret(what, until_regret, options.seconds) if until_regret else None
         with told() as warned, progress(f"measuring {what.name}") as report:
             measured = measure(
                 what,
@@ -135,9 +135,9 @@ def profile(options: argparse.Namespace) -> Answer:
                 executor=options.executor,
                 store=store,
                 progress=report,
-                until=until or None,
+                until=until,
             )
-        if until:
+        if until is not None:
             print(f"anytime: {what.name}: {until!r}", file=sys.stderr)
             told_of |= {"problems": until.problems, "regret": until.bound, "left": until.left}
             missed |= until.left > 0

@@ -262,7 +262,7 @@ class _Watch:
             self._shadow.odd[f"{self._watched.name} with a score that is none"] += 1
             return
         if len(seen.seconds) >= RESULTS:  # the last one is the result
-            seen.seconds.pop(), seen.scores.pop()
+            del seen.seconds[-1], seen.scores[-1]
         seen.seconds.append(round(self._spent, 9))
         seen.scores.append(worth)
         parts: tuple[Any, ...] = cast("tuple[Any, ...]", value) if type(value) is tuple else ()
