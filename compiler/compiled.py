@@ -290,10 +290,13 @@ class CompiledProgram:
         now = deadline.clock.now()
         output = execution.known(self.program.output)
         fault = next((part.fault for part in parts.values() if part.fault), None)
+        shares = {**allocation.shares, **execution.granted}
         spent = " → ".join(
-            f"{label} {duration(part.elapsed)} of {duration(allocation.shares[label])}"
+            f"{label} {duration(part.elapsed)} of {duration(shares[label])}"
             for label, part in parts.items()
         )
+        ended = [(label, watch.why) for label, watch in execution.watches.items() if watch.why]
+        spent = "; ".join([spent, *(f"{label} {why}" for label, why in ended)])
         if output is None:
             silent = next((label for label, part in parts.items() if not part), "nothing")
             spent += f"; {silent} had no result"

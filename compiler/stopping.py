@@ -1,0 +1,105 @@
+"""When to end a call that shows what it has: optimal stopping within its run.
+
+The level of the result is a Markov chain over the moments of the call [Hansen & Zilberstein 2001,
+non-myopic monitoring], whose transitions are counted over the recorded runs with the weights of
+the table. So they carry the distribution of the table from each moment to the next exactly, and
+whoever ends at one moment whatever is seen gets what the table promises: stopping by what is seen
+is never worth less.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from compiler.tables import Table
+
+Floats = NDArray[np.float64]
+TIE = 1e-12  # by which going on must be worth more
+
+
+@dataclass(frozen=True)
+class Stopping:
+    """The decisions within a call, for every state and for every tick left when it begins.
+
+    value: [..., R] with the best decisions. latest: [..., R] moment by which it always ends.
+    ends: [..., M, ⌈L / 8⌉, R] whether to end at a moment with a level, a bit for each level.
+    """
+
+    value: Floats
+    latest: NDArray[np.int16]
+    ends: NDArray[np.uint8]
+
+
+def transitions(table: Table) -> Floats:
+    """Of a call, the probability of each level at the next moment given that at a moment and the
+    levels of its inputs, [M - 1, L_1, …, L_k, L, L].
+
+    From a level at which no run was, as many levels up or down as from the nearest with a run.
+    Raises ValueError for a table whose runs are not known.
+    """
+    if table.courses is None:
+        raise ValueError(f"the runs behind the table of {table.label} are not known")
+    size, cells = len(table.levels), table.courses.weights.shape[:-1]
+    runs, weights = (
+        table.courses.levels,
+        table.courses.weights.reshape(-1, len(table.courses.levels)),
+    )
+    cell, run = np.nonzero(weights)
+    counts, shape = weights[cell, run], (len(weights), size, size)
+    found = np.zeros((len(table.times) - 1, *shape))
+    for moment, chances in enumerate(found):
+        place = np.ravel_multi_index((cell, runs[run, moment], runs[run, moment + 1]), shape)
+        chances += np.bincount(place, counts, minlength=chances.size).reshape(shape)
+        mass = chances.sum(axis=-1)
+        chances /= np.where(mass > 0, mass, 1.0)[..., None]
+        _filled(chances, mass)
+    return found.reshape(len(found), *cells, size, size)
+
+
+def _filled(chances: Floats, mass: Floats) -> None:
+    """Fill the rows of levels at which no run was, [cells, L, L] in place."""
+    chances[mass.sum(axis=-1) == 0] = np.eye(chances.shape[-1])  # without an input nothing changes
+    cell, level = np.nonzero((mass == 0) & (mass.sum(axis=-1, keepdims=True) > 0))
+    every = np.arange(chances.shape[-1])
+    apart = np.where(mass[cell] > 0, np.abs(every - level[:, None]), len(every))
+    near = apart.argmin(axis=-1)
+    rows = chances[cell, near]
+    to = every + (level - near)[:, None]
+    to = np.clip(to, np.minimum(level, 1)[:, None], len(every) - 1)  # a result is never lost
+    np.add.at(chances, (cell[:, None], level[:, None], to), rows)
+
+
+def stop(
+    begins: Floats, steps: Floats, units: NDArray[np.intp], worth: Floats, patient: bool
+) -> Stopping:
+    """The best decisions within a call, backwards from its last moment.
+
+    begins: [..., M, L] the table's chances. steps: [M - 1, ..., L, L] its transitions. units: [M]
+    ticks until each moment. worth: [..., L, R] of ending with a level and so many ticks left; the
+    axes before may be more than those of the others, which are the last of them.
+    patient: go on where that makes no difference; without a result it always does.
+    """
+    ticks = worth.shape[-1]
+    count = max(1, int((units < ticks).sum()))
+    shape, levels = worth.shape[:-2], worth.shape[-2]
+    ends = np.full((*shape, count, -(-levels // 8), ticks), 255, dtype=np.uint8)
+    going = np.zeros((*shape, count, ticks), dtype=bool)
+    eager = np.full((levels, 1), TIE)
+    eager[: levels if patient else 1] = -TIE
+    value = worth[..., : ticks - units[count - 1]]
+    for moment in range(count - 2, -1, -1):
+        after = np.matmul(steps[moment], value)
+        value = worth[..., : ticks - units[moment]].copy()
+        now = value[..., units[moment + 1] - units[moment] :]
+        on = after > now + eager
+        at = slice(units[moment + 1], None)
+        ends[..., moment, :, at] = np.packbits(~on, axis=-2)
+        likely = (begins[..., moment, :] > 0)[..., None]
+        going[..., moment, at] = (on & likely).any(axis=-2)
+        np.copyto(now, after, where=on)
+    latest = np.where(going.all(axis=-2), count - 1, (~going).argmax(axis=-2))
+    first = np.einsum("...l,...lr->...r", begins[..., 0, :], value)
+    return Stopping(first, latest.astype(np.int16), ends)
