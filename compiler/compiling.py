@@ -59,7 +59,7 @@ def compile(
         )
     steps = guards_of(profiles)
     replay = None
-    if _plain(program) and objective is EXPECTED:
+    if _plain(program) and objective == EXPECTED:
         # On the machine of the profiles, so that a faster one never promises less.
         there = made if machine is None else tables(program, measured)
         known = frontier if machine is None else divide(there)

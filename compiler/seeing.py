@@ -42,7 +42,7 @@ def check(program: Program, seen: Collection[str], objective: Objective) -> None
         raise AnytimeError(
             "adaptive=True decides between calls that follow each other; leave parallel out"
         )
-    tests = tests_of(program)
+    tests = only_asked(program)
     for call in program.calls:
         if call is not program.output and call.label not in tests and call.label not in seen:
             raise AnytimeError(
@@ -60,7 +60,7 @@ def watched(program: Program, tables: Sequence[Table], seen: Collection[str]) ->
 
 def as_seen(program: Program, table: Table) -> Table:
     """A test's table as the run sees it: not whether it is right, only how often it is."""
-    if table.label not in tests_of(program):
+    if table.label not in only_asked(program):
         return table
     there = table.chances[..., 1:].sum(axis=-1)
     right = np.where(there > 0, table.expected / np.maximum(there, 1e-12), np.nan)
@@ -97,7 +97,7 @@ def _calibrated(profile: Profile) -> Seen:
     return at[kept], means[kept]
 
 
-def tests_of(program: Program) -> set[str]:
+def only_asked(program: Program) -> set[str]:
     """Labels of calls that are only asked by branches."""
     asked, passed = set[str](), set[str]()
     for node in program.nodes:

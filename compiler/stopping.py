@@ -2,9 +2,9 @@
 
 The level of the result is a Markov chain over the moments of the call [Hansen & Zilberstein 2001,
 non-myopic monitoring], whose transitions are counted over the recorded runs with the weights of
-the table. So they carry the distribution of the table from each moment to the next exactly, and
-whoever ends at one moment whatever is seen gets what the table promises: stopping by what is seen
-is never worth less.
+the table. They carry the distribution of the table from each moment to the next exactly. So whoever
+ends at one moment whatever is seen gets what the table promises, and stopping by what is seen is
+never worth less.
 """
 
 from __future__ import annotations
@@ -37,26 +37,56 @@ def transitions(table: Table) -> Floats:
     """Of a call, the probability of each level at the next moment given that at a moment and the
     levels of its inputs, [M - 1, L_1, …, L_k, L, L].
 
-    From a level at which no run was, as many levels up or down as from the nearest with a run.
+    A run counts for the level that it has, and half for those next to it: of a few dozen runs only
+    one or two may have had a level at a moment, and a policy must not take their luck for a rule.
+    What that moves away from the distribution of the table is put back as evenly as can be. From a
+    level at which no run was, as many levels up or down as from the nearest with a run.
     Raises ValueError for a table whose runs are not known.
     """
     if table.courses is None:
         raise ValueError(f"the runs behind the table of {table.label} are not known")
     size, cells = len(table.levels), table.courses.weights.shape[:-1]
-    runs, weights = (
-        table.courses.levels,
-        table.courses.weights.reshape(-1, len(table.courses.levels)),
-    )
+    runs = table.courses.levels
+    weights = table.courses.weights.reshape(-1, len(runs))
     cell, run = np.nonzero(weights)
     counts, shape = weights[cell, run], (len(weights), size, size)
     found = np.zeros((len(table.times) - 1, *shape))
     for moment, chances in enumerate(found):
         place = np.ravel_multi_index((cell, runs[run, moment], runs[run, moment + 1]), shape)
         chances += np.bincount(place, counts, minlength=chances.size).reshape(shape)
-        mass = chances.sum(axis=-1)
-        chances /= np.where(mass > 0, mass, 1.0)[..., None]
-        _filled(chances, mass)
+        now, then = chances.sum(axis=-1), chances.sum(axis=-2)
+        _smooth(chances)
+        _restore(chances, now, then)
+        chances /= np.where(now > 0, now, 1.0)[..., None]
+        _filled(chances, now)
     return found.reshape(len(found), *cells, size, size)
+
+
+def _smooth(chances: Floats) -> None:
+    """Let each run count half for the levels next to its own, with the same rise or fall, in place.
+    What has no result is like nothing else."""
+    some = chances[:, 1:, 1:]
+    near = np.zeros_like(some)
+    near[:, 1:, 1:] += some[:, :-1, :-1] / 2
+    near[:, :-1, :-1] += some[:, 1:, 1:] / 2
+    some += near
+
+
+def _restore(chances: Floats, now: Floats, then: Floats) -> None:
+    """Change joint chances [cells, L, L] as little as need be so that they sum to `now` over the
+    next levels and to `then` over the present ones, in place: none is raised beyond its share, and
+    what is missing goes from the lowest to the lowest (the monotone coupling)."""
+    for axis, wanted in ((-1, now), (-2, then)):
+        total = chances.sum(axis=axis)
+        share = np.where(total > 0, wanted / np.where(total > 0, total, 1.0), 0.0)
+        chances *= np.expand_dims(share if axis == -1 else np.minimum(share, 1.0), axis)
+    left, lacking = now - chances.sum(axis=-1), then - chances.sum(axis=-2)
+    ends = np.cumsum(np.maximum(left, 0.0), axis=-1)[..., None]
+    others = np.cumsum(np.maximum(lacking, 0.0), axis=-1)[..., None, :]
+    begin = np.maximum(
+        ends - np.maximum(left, 0.0)[..., None], others - np.maximum(lacking, 0.0)[..., None, :]
+    )
+    chances += np.maximum(np.minimum(ends, others) - begin, 0.0)
 
 
 def _filled(chances: Floats, mass: Floats) -> None:
