@@ -133,3 +133,16 @@ def stop(
     latest = np.where(going.all(axis=-2), count - 1, (~going).argmax(axis=-2))
     first = np.einsum("...l,...lr->...r", begins[..., 0, :], value)
     return Stopping(first, latest.astype(np.int16), ends)
+
+
+def endings(begins: Floats, steps: Floats, ends: NDArray[np.bool_]) -> Floats:
+    """Where a call ends for one state: the chance of each moment and level, [M', L].
+
+    begins: [L] chances at its first moment. steps: [M - 1, L, L]. ends: [M', L] of the decisions.
+    """
+    going, found = begins, np.zeros(ends.shape)
+    for moment, over in enumerate(ends):
+        found[moment] = np.where(over, going, 0.0)
+        if moment < len(steps):
+            going = np.where(over, 0.0, going) @ steps[moment]
+    return found

@@ -45,8 +45,8 @@ class Watch:
 
     @property
     def why(self) -> str:
-        """Why the call was ended before the share's latest end; empty where it was not."""
+        """Why the call was ended before the end of its share; empty where it was not."""
         if self.ended is None or self.ended >= self.share.seconds - 1e-9:
             return ""
-        got = "without a result" if self.shown is None else f"at {number(self.shown)}"
-        return f"ended early {got}: its time is worth more elsewhere"
+        showed = "nothing" if self.shown is None else number(self.shown)
+        return f" (ended by what it showed, {showed})"
