@@ -317,7 +317,13 @@ class CompiledProgram:
         adaptive schedule also what it decides while it runs."""
         seconds = _finite(seconds)
         found = explain(
-            self.name, self.tables, self.frontier, seconds, self.calibration, self.regret
+            self.name,
+            self.tables,
+            self.frontier,
+            seconds,
+            self.calibration,
+            self.regret,
+            self.objective,
         )
         plan = self._plan(seconds)
         if self.policy is None or plan is None:

@@ -14,6 +14,7 @@ from anytime.programs import Program
 from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.costs import stretched
 from compiler.division import Frontier, divide
+from compiler.objectives import EXPECTED, Objective
 from compiler.policies import Plan, Policy
 from compiler.stopping import endings, transitions
 from compiler.tables import Table
@@ -125,6 +126,7 @@ def explain(
     seconds: float,
     calibration: Calibration = AS_IT_IS,
     regret: float = 1.0,
+    objective: Objective = EXPECTED,
 ) -> Explanation:
     """The division of a budget with the price of a little more time for each call.
 
@@ -148,7 +150,7 @@ def explain(
     for place, table in enumerate(tables):
         if table.rule is not None:
             continue
-        again = divide([*tables[:place], table.ahead(step), *tables[place + 1 :]])
+        again = divide([*tables[:place], table.ahead(step), *tables[place + 1 :]], objective)
         # The division that is promised now still fits, so that the promise cannot be lower.
         gain = max(calibration.promise(again.promise(seconds)) - promised, 0.0)
         rate = gain / step if step > 0 else 0.0

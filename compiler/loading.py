@@ -253,10 +253,12 @@ def _courses(
         raise refuse("the levels of its runs are not one for each moment, of those it has")
     if len(cells) != math.prod(record.shape[:-2]) or any(len(row) != len(rows) for row in cells):
         raise refuse("the weights of its runs are not one for each run and input")
+    levels = np.array(rows, dtype=np.intp)
     weights = np.array(cells, dtype=float).reshape(*chances.shape[:-2], len(rows))
-    if weights.min() < 0 or weights.sum(axis=-1).max() > 1 + 1e-6:
-        raise refuse("the weights of its runs must be >= 0 and sum to at most 1")
-    return Courses(np.array(rows, dtype=np.intp), weights)
+    counted = np.stack([weights @ (levels == level) for level in range(1, count)], axis=-1)
+    if weights.min() < 0 or np.abs(counted - chances[..., 1:]).max() > 1e-6:
+        raise refuse("its chances are not those of its runs")
+    return Courses(levels, weights)
 
 
 def _tables(path: Path, program: Program, stored: Sequence[Table]) -> tuple[Table, ...]:

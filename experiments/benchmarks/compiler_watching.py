@@ -25,7 +25,7 @@ from compiler.stopping import transitions
 from compiler.tables import Courses, Table
 from experiments.benchmarks.compiler_adaptive import COST, LEVELS, LUCK, STEPS, chain
 
-RUNS = 300  # that a table counts for each level of its input
+RUNS, FEW = 300, 30  # that a table counts for each level of its input
 LIVES = 2000
 SPREAD = 0.05  # between runs of the same luck
 QUALITIES = np.linspace(0.0, 1.0, LEVELS)
@@ -55,6 +55,16 @@ class Stage:
         return levels
 
 
+@dataclass(frozen=True)
+class Compared:
+    """A chain's tables with the plan that decides at boundaries and the one that decides inside."""
+
+    tables: list[Table]
+    steps: dict[str, np.ndarray]
+    plain: Plan
+    inside: Plan
+
+
 def measure(count: int, seed: int) -> tuple[dict[str, float | int | None], int]:
     """Figures of `count` chains for each chance of bad luck, and in how many of them deciding
     inside is worth less than deciding at boundaries."""
@@ -62,37 +72,45 @@ def measure(count: int, seed: int) -> tuple[dict[str, float | int | None], int]:
     program = chain()
     objective = compiler.expected(lambda quality, steps: quality - COST * steps)
     computed: dict[float, list[tuple[float, float]]] = {luck: [] for luck in LUCK}
-    fresh: list[tuple[float, float]] = []
+    unseen_gains: dict[int, list[tuple[float, float]]] = {RUNS: [], FEW: []}
     below, worst = 0, 0.0
     for luck in LUCK:
         for place in range(count):
             stages = drawn(program, luck, rng)
-            tables = counted(program, stages, RUNS, rng)
-            steps = {table.label: transitions(table) for table in tables}
-            plain = plan_for(program, tables, float(STEPS), objective)
-            inside = plan_for(program, tables, float(STEPS), objective, steps)
-            below += bool(inside.value < plain.value - 1e-9)
-            computed[luck].append((plain.value, inside.value))
+            many = compared(program, counted(program, stages, RUNS, rng), objective)
+            below += bool(many.inside.value < many.plain.value - 1e-9)
+            computed[luck].append((many.plain.value, many.inside.value))
             if place > count // 4:  # some of them are lived
                 continue
-            lived, error = live(program, tables, inside, objective, chained(tables, steps, rng))
-            worst = max(worst, abs(lived - inside.value) / error)
-            new = [
-                live(program, tables, p, objective, unseen(stages, rng)) for p in (plain, inside)
-            ]
-            if luck:
-                fresh.append((new[0][0], new[1][0]))
+            own = chained(many.tables, many.steps, rng)
+            lived, error = live(program, many.tables, many.inside, objective, own)
+            worst = max(worst, abs(lived - many.inside.value) / error)
+            if not luck:
+                continue
+            few = compared(program, counted(program, stages, FEW, rng), objective)
+            for runs, each in ((RUNS, many), (FEW, few)):
+                fresh = unseen(stages, rng)
+                plain, _ = live(program, each.tables, each.plain, objective, fresh)
+                inside, _ = live(program, each.tables, each.inside, objective, fresh)
+                unseen_gains[runs].append((plain, inside))
+    gains = {luck: gain(pairs) for luck, pairs in computed.items()}
     figures = {
         "adaptive.inside_gain": gain([pair for luck in LUCK[1:] for pair in computed[luck]]),
-        **{
-            f"adaptive.inside_gain_luck_{100 * luck:.0f}": gain(pairs)
-            for luck, pairs in computed.items()
-        },
-        "adaptive.inside_gain_unseen": gain(fresh),
+        **{f"adaptive.inside_gain_luck_{100 * luck:.0f}": each for luck, each in gains.items()},
+        "adaptive.inside_gain_unseen": gain(unseen_gains[RUNS]),
+        "adaptive.inside_gain_few": gain(unseen_gains[FEW]),
         "adaptive.inside_lived_worst_z": worst,
         "adaptive.inside_count": len(LUCK) * count,
     }
     return figures, below
+
+
+def compared(program: Program, tables: list[Table], objective: Objective) -> Compared:
+    """Both plans on the same tables."""
+    steps = {table.label: transitions(table) for table in tables}
+    plain = plan_for(program, tables, float(STEPS), objective)
+    inside = plan_for(program, tables, float(STEPS), objective, steps)
+    return Compared(tables, steps, plain, inside)
 
 
 def gain(pairs: Sequence[tuple[float, float]]) -> float:

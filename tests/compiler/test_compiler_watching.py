@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 
 import anytime
 import compiler
-from anytime import Machine, Status, WorkClock
+from anytime import AnytimeError, Machine, Status, WorkClock
+from anytime.files import checksum
 from compiler.adaptive import plan_for
 
 MACHINE = Machine("m").with_rate("look", 0.01).with_rate("think", 0.01).with_rate("find", 0.01)
@@ -132,3 +134,25 @@ def test_it_says_what_it_decides_while_it_runs(schedule):
     assert "look ends after 20.0 ms … 100.0 ms (60.0 ms on average) by what it shows" in repr(
         explained
     )
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "reason"),
+    [
+        ("levels", [], "not one for each moment"),
+        ("levels", [[0]], "not one for each moment"),
+        ("levels", [[99] * 13] * 10, "not one for each moment"),
+        ("weights", [], "not one for each run"),
+        ("weights", [[1.0]], "not one for each run"),
+        ("weights", [[-0.1, 0.3] * 5], "not those of its runs"),
+    ],
+)
+def test_a_file_with_runs_that_do_not_fit_is_refused(schedule, tmp_path, key, value, reason):
+    path = tmp_path / "a.schedule"
+    schedule.save(path)
+    content = json.loads(path.read_text())
+    del content["checksum"]
+    content["tables"][0]["courses"][key] = value
+    path.write_text(json.dumps(content | {"checksum": checksum(content)}))
+    with pytest.raises(AnytimeError, match=reason):
+        compiler.load(path, modules=[look, think])
