@@ -111,7 +111,7 @@ class Execution:
         own = replace(self.deadline, clock=clock, at=hard if held else ends)
         observe = None if self.on_result is None else partial(self.on_result, call.label)
         if share is not None and share.watched:
-            watch = self.watches[call.label] = Watch(share, clock, clock.now(), observe)
+            watch = self.watches[call.label] = Watch(share, clock, observe)
             own, observe = own.earlier(Deadline(clock, event=watch.over)), watch.observe
         may_step = held or Run.may_step
         self.parts[call.label], _ = execute(

@@ -65,12 +65,9 @@ class Share:
         """Whether it depends on what the call shows while it runs."""
         return len(self.moments) > 0
 
-    def over(self, elapsed: float, estimate: float | None) -> bool:
-        """Whether a watched call is to end that has run for so many seconds and whose last result
-        shows this; None while there is none."""
-        moment = int(np.searchsorted(self.moments, elapsed + 1e-9, side="right")) - 1
-        level = 0 if estimate is None else nearest(self.levels, estimate, self.seen)
-        return bool(self.ends[max(0, moment), level])
+    def level(self, estimate: float) -> int:
+        """The level of a result that shows this."""
+        return nearest(self.levels, estimate, self.seen)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 from anytime.clocks import Clock
@@ -14,7 +14,6 @@ from compiler.policies import Share
 Observer = Callable[[Any, Change], None]
 
 
-@dataclass
 class Watch:
     """A call that is watched. What it registers is passed on to an observer, if there is one.
 
@@ -22,31 +21,35 @@ class Watch:
     it; None while it goes on.
     """
 
-    share: Share
-    clock: Clock
-    started: float
-    observer: Observer | None = None
-    shown: float | None = None
-    ended: float | None = None
+    def __init__(self, share: Share, clock: Clock, observer: Observer | None = None) -> None:
+        self.shown: float | None = None
+        self.ended: float | None = None
+        self._share, self._clock, self._observer = share, clock, observer
+        self._started = clock.now()
+        # Lists, because a quick module asks every few microseconds.
+        self._moments, self._ends = share.moments.tolist(), share.ends.tolist()
+        self._level = 0
 
     def observe(self, value: Any, change: Change) -> None:
         """Take note of a result."""
         self.shown = 1.0 if change.estimate is None else change.estimate
-        if self.observer is not None:
-            self.observer(value, change)
+        self._level = self._share.level(self.shown)
+        if self._observer is not None:
+            self._observer(value, change)
 
     def over(self) -> bool:
         """Whether the call is to end here; the event of its deadline."""
         if self.ended is None:
-            elapsed = self.clock.now() - self.started
-            if self.share.over(elapsed, self.shown):
+            elapsed = self._clock.now() - self._started
+            moment = max(0, bisect_right(self._moments, elapsed + 1e-9) - 1)
+            if self._ends[moment][self._level]:
                 self.ended = elapsed
         return self.ended is not None
 
     @property
     def why(self) -> str:
         """Why the call was ended before the end of its share; empty where it was not."""
-        if self.ended is None or self.ended >= self.share.seconds - 1e-9:
+        if self.ended is None or self.ended >= self._share.seconds - 1e-9:
             return ""
         showed = "nothing" if self.shown is None else number(self.shown)
         return f" (ended by what it showed, {showed})"
