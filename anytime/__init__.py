@@ -3,6 +3,7 @@
 from anytime import neighbours as _neighbours
 from anytime.clocks import Clock, Deadline, WallClock, WorkClock
 from anytime.errors import AnytimeError, OutsideRunError
+from anytime.knobs import knob
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine
 from anytime.measuring import measure
@@ -27,6 +28,7 @@ __all__ = [
     "charge",
     "expired",
     "here",
+    "knob",
     "measure",
     "module",
     "register",

@@ -17,7 +17,7 @@ from anytime.profiles import Profile, Recording
 
 PROFILE = "anytime.profile/1"
 MACHINE = "anytime.machine/1"
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,99}")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,99}(@[A-Za-z0-9_.=,-]{1,99})?")
 
 
 class ProfileLibrary(Mapping[str, Profile]):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from anytime.knobs import family_of
 
 # Steps of a module that does not count its own work cost different times (a ladder of growing
 # models, a growing tree): their seconds are kept in geometric bins of the step's index.
@@ -48,12 +49,16 @@ class Machine:
     name: str
     rates: Mapping[str, Rate] = field(default_factory=dict[str, Rate])
 
+    def rate(self, module: str) -> Rate | None:
+        """The rate of a module; of one with set knobs its own, or that of all its settings."""
+        return self.rates.get(module, self.rates.get(family_of(module)))
+
     def seconds(self, module: str, work: float, step: int | None = None) -> float:
         """Expected seconds of `work` units, or of the uncharged step with index `step`.
 
         Raises AnytimeError when the machine has no rate for the module.
         """
-        rate = self.rates.get(module)
+        rate = self.rate(module)
         if rate is None:
             known = ", ".join(sorted(self.rates)) or "none"
             raise AnytimeError(
@@ -66,7 +71,7 @@ class Machine:
 
     def elapsed(self, module: str, work: NDArray[np.float64]) -> NDArray[np.float64]:
         """Seconds [n] after which amounts of work [n] of one run are done."""
-        rate = self.rates.get(module)
+        rate = self.rate(module)
         if rate is None or not rate.per_step:
             return np.array([self.seconds(module, float(w)) for w in work])
         steps = int(work.max(initial=0.0))

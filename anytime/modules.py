@@ -5,11 +5,12 @@ from __future__ import annotations
 import inspect
 import pickle
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from anytime import calling, naming
 from anytime.errors import AnytimeError
+from anytime.knobs import MOST, Knob, setting_name, settings
 
 Score = Callable[..., float]
 FILLED = ("seconds", "rng", "memory")
@@ -40,6 +41,7 @@ class Module:
     problems: called with (rng), yields problems to measure on; the command line uses it.
     features: called with the inputs; named properties of them to condition the profile on.
     isolated: what it may take, for a module that runs in a worker process; None for the others.
+    knobs: its keyword-only parameters that may be set, see `anytime.knob`. chosen: what they are.
     """
 
     name: str
@@ -53,6 +55,31 @@ class Module:
     features: Callable[..., Mapping[str, float]] | None = None
     generator: bool = False
     isolated: Limits | None = None
+    knobs: Mapping[str, Knob] = field(default_factory=dict[str, Knob])
+    chosen: Mapping[str, Any] = field(default_factory=dict[str, Any])
+
+    def set(self, **values: Any) -> Module:
+        """This module with all of its knobs set, under a name of its own: find_path@weight=3.
+
+        Raises AnytimeError for a knob that it does not have, is not given, or has no such value.
+        """
+        for name, value in values.items():
+            if name not in self.knobs or value not in self.knobs[name].values:
+                known = ", ".join(f"{name} {list(k.values)}" for name, k in self.knobs.items())
+                raise AnytimeError(
+                    f"{self.name} has no knob {name} with {value!r}; it has {known or 'none'}"
+                )
+        missing = [name for name in self.knobs if name not in values]
+        if missing:
+            raise AnytimeError(f"{self.name}.set needs {missing[0]}=…; all of its knobs are set")
+        chosen = {name: values[name] for name in self.knobs}
+        return replace(self, name=setting_name(self.name, chosen), knobs={}, chosen=chosen)
+
+    def settings(self) -> tuple[Module, ...]:
+        """The module with its knobs set in every way; itself where it has none."""
+        if not self.knobs:
+            return (self,)
+        return tuple(self.set(**chosen) for chosen in settings(self.knobs))
 
     @property
     def contract(self) -> bool:
@@ -77,12 +104,15 @@ class Module:
             )
         return caller.call(self, arguments)
 
-    def __reduce__(self) -> tuple[Callable[..., object], tuple[str, ...]]:
-        """Another process finds a module by its name, as it does a function."""
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[Any, ...]]:
+        """Another process finds a module by its name, as it does a function, and sets it."""
         address = naming.address(self.function)
         try:
-            if naming.found(*address) is self:
+            known = naming.found(*address)
+            if known is self:
                 return naming.found, address
+            if not self.knobs and self.chosen and known.set(**self.chosen).name == self.name:
+                return _set, (*address, dict(self.chosen))
         except AnytimeError as error:
             raise pickle.PicklingError(str(error)) from None
         raise pickle.PicklingError(f"{'.'.join(address[:2])} is not the module {self.name!r}")
@@ -129,7 +159,11 @@ def module(
         label = name or function.__name__
         if inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function):
             raise AnytimeError(f"module {label!r} is async; write a generator or a plain function")
-        positional, filled = _signature(label, function)
+        positional, filled, knobs = _signature(label, function)
+        if len(list(settings(knobs))) > MOST:
+            raise AnytimeError(
+                f"module {label!r} has too many settings; at most {MOST} are measured"
+            )
         is_generator = inspect.isgeneratorfunction(function)
         if isolated and "memory" in filled:
             raise AnytimeError(
@@ -153,21 +187,37 @@ def module(
             features,
             is_generator,
             Limits() if isolated is True else isolated or None,
+            knobs,
+            {name: each.values[0] for name, each in knobs.items()},
         )
 
     return decorate
 
 
-def _signature(name: str, function: Callable[..., Any]) -> tuple[tuple[str, ...], frozenset[str]]:
+def _set(module: str, name: str, file: str, chosen: Mapping[str, Any]) -> Module:
+    return naming.found(module, name, file).set(**chosen)
+
+
+def _signature(
+    name: str, function: Callable[..., Any]
+) -> tuple[tuple[str, ...], frozenset[str], dict[str, Knob]]:
     positional: list[str] = []
     filled: set[str] = set()
+    knobs: dict[str, Knob] = {}
     for parameter in inspect.signature(function).parameters.values():
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             raise AnytimeError(
                 f"module {name!r} has *{parameter.name}; name its inputs one by one, "
                 "because profiles are conditioned on them by name"
             )
-        if parameter.kind is not parameter.KEYWORD_ONLY:
+        if isinstance(parameter.default, Knob):
+            if parameter.kind is not parameter.KEYWORD_ONLY:
+                raise AnytimeError(
+                    f"module {name!r} has the knob {parameter.name!r} among its inputs; put it "
+                    "behind a *"
+                )
+            knobs[parameter.name] = parameter.default
+        elif parameter.kind is not parameter.KEYWORD_ONLY:
             positional.append(parameter.name)
         elif parameter.name in FILLED:
             filled.add(parameter.name)
@@ -176,7 +226,7 @@ def _signature(name: str, function: Callable[..., Any]) -> tuple[tuple[str, ...]
                 f"module {name!r} has the keyword-only parameter {parameter.name!r}, which nothing "
                 f"fills in; filled in are {', '.join(FILLED)}"
             )
-    return tuple(positional), frozenset(filled)
+    return tuple(positional), frozenset(filled), knobs
 
 
 def _takes_two(function: Callable[..., Any]) -> bool:

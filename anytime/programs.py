@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from anytime import calling
 from anytime.errors import AnytimeError
-from anytime.joins import Rule
+from anytime.joins import Best, Rule
 from anytime.modules import Module
 
 
@@ -22,8 +22,10 @@ class Reading:
         self.nodes: list[Call | Join] = []
         self.parallels: list[Parallel] = []
 
-    def call(self, module: Module, arguments: tuple[object, ...]) -> Call:
+    def call(self, module: Module, arguments: tuple[object, ...]) -> Call | Join:
         """A new call; plain arguments become constants, the label is numbered when it repeats.
+
+        A module with knobs is called in every setting, and whichever is worth most is chosen.
 
         Raises AnytimeError for the wrong number of arguments, and for two modules of one name:
         profiles are kept by name.
@@ -33,6 +35,11 @@ class Reading:
                 f"program {self.program!r} calls {module.name} with {len(arguments)} arguments; "
                 f"it takes {len(module.parameters)}: {', '.join(module.parameters)}"
             )
+        if module.knobs:
+            # Settings go from hasty to thorough: of several that ran the last is taken, unless
+            # estimates tell which is the best.
+            made = [self.call(each, arguments) for each in module.settings()]
+            return self.chosen(made[::-1])
         calls = [node for node in self.nodes if isinstance(node, Call)]
         if any(c.module.name == module.name and c.module is not module for c in calls):
             raise AnytimeError(
@@ -43,6 +50,15 @@ class Reading:
         made = Call(module, nodes, label)  # pyright: ignore[reportArgumentType]
         self.nodes.append(made)
         return made
+
+    def chosen(self, alternatives: Sequence[Call | Join]) -> Call | Join:
+        """The best of several results by their estimates; the first that is there without them."""
+        made = (call for each in alternatives for call in makers(each))
+        rule = Best(all(call.module.estimate is not None for call in made))
+        *rest, best = alternatives
+        for alternative in reversed(rest):
+            best = self.join(rule, (alternative, best))
+        return best
 
     def join(self, rule: Rule, arguments: tuple[Source, ...]) -> Join:
         """A new result made of others by a rule."""
@@ -232,6 +248,6 @@ def makers(node: Call | Join) -> tuple[Call, ...]:
 
 def program_of(module: Module) -> Program:
     """A lone module as the program that calls it on inputs of its parameters' names."""
-    arguments = tuple(Input(name) for name in module.parameters)
-    call = Call(module, arguments, module.name)
-    return Program(module.name, module.parameters, (call,), call)
+    with reading(module.name) as opened:
+        output = opened.call(module, tuple(Input(name) for name in module.parameters))
+    return Program(module.name, module.parameters, tuple(opened.nodes), output)

@@ -263,7 +263,7 @@ def execute(
             f"module {module.name!r} takes {len(module.parameters)} inputs "
             f"({', '.join(module.parameters)}), not {len(inputs)}"
         )
-    filled: dict[str, Any] = {}
+    filled: dict[str, Any] = dict(module.chosen)
     if "seconds" in module.filled:
         filled["seconds"] = max(0.0, deadline.remaining())
     if "rng" in module.filled:

@@ -13,6 +13,7 @@ import numpy as np
 
 from anytime.clocks import Clock, Deadline
 from anytime.errors import AnytimeError
+from anytime.knobs import family_of
 from anytime.machines import step_bin
 from anytime.modules import Module
 from anytime.outcomes import Outcome, Pace
@@ -87,9 +88,12 @@ def _references(program: Program, samples: Mapping[str, list[_Sample]]) -> dict[
         if call.module.quality is not None:
             continue
         costs = [float(cost) for run in samples[call.label] for cost in run.raw if cost > 0]
-        name = call.module.name
-        best[name] = min([*costs, best.get(name, math.inf)])
-    return {name: cost if math.isfinite(cost) else 1.0 for name, cost in best.items()}
+        # Settings of one module are compared with each other, so they share the reference.
+        family = family_of(call.module.name)
+        best[family] = min([*costs, best.get(family, math.inf)])
+    names = [call.module.name for call in program.calls if call.module.quality is None]
+    known = {name: best[family_of(name)] for name in names}
+    return {name: cost if math.isfinite(cost) else 1.0 for name, cost in known.items()}
 
 
 def _quality(sample: _Sample, index: int, references: Mapping[str, float]) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 
 from anytime import calling
 from anytime.errors import AnytimeError
-from anytime.joins import Best, Branch, Several, Tests, Until
+from anytime.joins import Branch, Several, Tests, Until
 from anytime.modules import Module
 from anytime.programs import Call, Input, Join, Parallel, Reading, Source, makers
 
@@ -55,11 +55,7 @@ def choose(*alternatives: Any) -> Any:
         raise AnytimeError("choose takes two alternatives or more")
     for alternative in alternatives:
         _result("choose", "an alternative", alternative)
-    compare = all(_seen(alternative) for alternative in alternatives)
-    *rest, chosen = alternatives
-    for alternative in reversed(rest):
-        chosen = reading.join(Best(compare), (alternative, chosen))
-    return chosen
+    return reading.chosen(alternatives)
 
 
 def all_of(*tests: Any, chances: Sequence[float]) -> Any:

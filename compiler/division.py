@@ -21,6 +21,7 @@ from compiler.elimination import (
     times_to_levels,
 )
 from compiler.objectives import EXPECTED, Objective
+from compiler.settings import settings_of
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
@@ -61,9 +62,13 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     once (three calls and more), for independent results, and for any number of calls where
     nothing is left to chance. Beyond, pairs of calls exchange their time optimally while the
     others keep theirs, starting from the best of the (min, +) solution for mean qualities and
-    the plain divisions (MIN, MAX, equal shares), which it so never falls below.
+    the plain divisions (MIN, MAX, equal shares), which it so never falls below. Modules with knobs
+    are set in one way each, the best for the budget.
     Raises AnytimeError for results with deadlines of their own and a value that is not a mean.
     """
+    settings = settings_of(tables)
+    if len(settings) > 1:
+        return _best([divide(each, objective) for each in settings])
     parts = independent(tables)
     if parts is not None:
         return _merged(tables, parts, objective)
@@ -91,6 +96,18 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
             moments = np.concatenate([moments, found[1]])
             values = np.concatenate([values, found[2]])
     return replace(_frontier(tables, totals, moments, values, objective), exact=False)
+
+
+def _best(frontiers: Sequence[Frontier]) -> Frontier:
+    """The divisions of several frontiers that none with as little time is better than."""
+    budgets = np.concatenate([each.budgets for each in frontiers])
+    shares = np.concatenate([each.shares for each in frontiers])
+    promised = np.concatenate([each.promised for each in frontiers])
+    order = np.lexsort((-promised, budgets))
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], promised[order][:-1]]))
+    kept = order[promised[order] > before]
+    exact = all(each.exact for each in frontiers)
+    return Frontier(budgets[kept], shares[kept], promised[kept], exact)
 
 
 def independent(tables: Sequence[Table]) -> tuple[tuple[int, ...], ...] | None:

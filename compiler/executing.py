@@ -79,17 +79,7 @@ class Execution:
 
     def known(self, node: object) -> Known | None:
         """What there is of a node by now."""
-        if isinstance(node, Input):
-            return Known(self.inputs[node.name])
-        if isinstance(node, Constant):
-            return Known(node.value)
-        if isinstance(node, Join):
-            return node.rule.value([self.known(argument) for argument in node.arguments])
-        assert isinstance(node, Call)
-        result = self.parts.get(node.label)
-        if not result:
-            return None
-        return Known(result.value, result.history[-1].estimate if result.history else None)
+        return known_of(node, self.parts, self.inputs)
 
     def _everything(self) -> dict[str, Known]:
         """All that is known, by label; an input's label is its name after "input"."""
@@ -213,6 +203,21 @@ class Execution:
         if node.label in self.parts:
             return bool(self.parts[node.label])
         return node.label not in self._skipped and all(map(self._possible, node.arguments))
+
+
+def known_of(node: object, parts: Mapping[str, Result], inputs: Mapping[str, Any]) -> Known | None:
+    """What there is of a node, from the results of calls by label and the program's inputs."""
+    if isinstance(node, Input):
+        return Known(inputs[node.name])
+    if isinstance(node, Constant):
+        return Known(node.value)
+    if isinstance(node, Join):
+        return node.rule.value([known_of(each, parts, inputs) for each in node.arguments])
+    assert isinstance(node, Call)
+    result = parts.get(node.label)
+    if not result:
+        return None
+    return Known(result.value, result.history[-1].estimate if result.history else None)
 
 
 def unwanted(

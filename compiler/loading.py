@@ -56,7 +56,9 @@ def _cannot_run(*inputs: object) -> None:
 
 
 def _restore(file: Path, stored: StoredSchedule, modules: Sequence[Module]) -> CompiledProgram:
-    program = _bind(file, stored, {module.name: module for module in modules})
+    program = _bind(
+        file, stored, {each.name: each for module in modules for each in module.settings()}
+    )
     made = _tables(file, program, [_restore_table(file, table) for table in stored.tables])
     _check_divisions(file, stored, made)
     objective = _restore_objective(file, *stored.objective)

@@ -2,7 +2,7 @@
 
 from monitor.bodies import Robot
 from monitor.endings import Ending
-from monitor.missions import Energy, Mission, Value
+from monitor.missions import Energy, Mission, News, Value
 from monitor.monitoring import Monitor
 from monitor.reports import Frame, Report
 from monitor.states import Decision, Situation, State
@@ -14,6 +14,7 @@ __all__ = [
     "Frame",
     "Mission",
     "Monitor",
+    "News",
     "Report",
     "Robot",
     "Situation",

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from anytime.programs import makers
 from compiler import CompiledProgram
 from monitor.bodies import Robot
 from monitor.courses import Course, Leg, course_of, legs_of, refined, smoothed
@@ -53,9 +54,7 @@ def live_steadily(
     longest = float(contracts.shares[:, 1:].sum(axis=1).max())
     endless = _patient(mission)
     lived: list[Steady] = []
-    for time in chosen:
-        rest = len(program.labels) - 1
-        shares = (float(time), *[longest / max(rest, 1)] * rest)
+    for shares in _constants(program, chosen.tolist(), longest):
         division = dict(zip(program.labels, shares, strict=True))
         policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
         told: list[Lived] = []
@@ -65,10 +64,23 @@ def live_steadily(
             route = robot.situation().to_go
             report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
             if report and route > 0:
-                told.append(_lived(float(time), route, report))
+                told.append(_lived(shares[0], route, report))
                 legs.append(legs_of(report))
         lived.append(Steady(shares, tuple(told), tuple(legs)))
     return tuple(lived)
+
+
+def _constants(
+    program: CompiledProgram, sensing: Sequence[float], longest: float
+) -> Iterator[tuple[float, ...]]:
+    """Each time of sensing, and all that is useful for the rest: for one plan of those that the
+    program chooses among, and in equal parts for that and for the calls before it."""
+    plans = [call.label for call in makers(program.program.output)]
+    for time in sensing:
+        for plan in plans:
+            rest = [each for each in program.labels[1:] if each == plan or each not in plans]
+            part = longest / max(len(rest), 1)
+            yield (float(time), *(part if each in rest else 0.0 for each in program.labels[1:]))
 
 
 def measure_rhythm(
@@ -95,8 +107,12 @@ def rhythm_from(lived: Sequence[Steady]) -> Rhythm | None:
 
 def courses_from(lived: Sequence[Steady]) -> tuple[Course, ...]:
     """The courses of missions lived at constant divisions."""
-    found = [course_of(steady.legs, steady.shares) for steady in lived]
-    return refined(smoothed([course for course in found if course is not None]))
+    settings: dict[tuple[bool, ...], list[Course]] = {}
+    for steady in lived:
+        course = course_of(steady.legs, steady.shares)
+        if course is not None:  # courses of different plans have nothing between them
+            settings.setdefault(tuple(share > 0 for share in steady.shares), []).append(course)
+    return tuple(course for alike in settings.values() for course in refined(smoothed(alike)))
 
 
 def calibrate(
@@ -165,7 +181,7 @@ def _patient(mission: Mission) -> Mission:
     """The mission as it would go on after its deadline, up to `PATIENCE` times as long."""
     value = mission.value
     until = value.deadline if np.isfinite(value.deadline) else 8 * value.seconds
-    return replace(mission, value=Value("hard", value.worth, PATIENCE * until))
+    return replace(mission, value=Value("hard", value.worth, PATIENCE * until), news=None)
 
 
 def _lived(sensing: float, route: float, report: Report) -> Lived:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.programs import makers
 from compiler import CompiledProgram
 from compiler.baselines import maximal_shares, minimal_shares
 from compiler.division import expected_quality, moments_within
@@ -66,9 +67,12 @@ def pinned_contracts(program: CompiledProgram, extreme: str) -> Contracts:
 
 
 def _contracts(program: CompiledProgram, shares: Floats) -> Contracts:
-    probes = np.array([[_efficiency(program, row) for row in _probed(row)] for row in shares])
+    calls = [place for place, table in enumerate(program.tables) if table.rule is None]
+    probes = np.array(
+        [[_efficiency(program, row) for row in _probed(row)[calls]] for row in shares]
+    )
     efficiency = np.array([_efficiency(program, row) for row in shares])
-    return Contracts(program.labels, shares, efficiency, probes)
+    return Contracts(program.labels, shares[:, calls], efficiency, probes)
 
 
 def _probed(row: Floats) -> Floats:
@@ -79,7 +83,11 @@ def _probed(row: Floats) -> Floats:
 def _efficiency(program: CompiledProgram, row: Floats) -> float:
     tables = program.tables
     quality = expected_quality(tables, moments_within(tables, row.tolist()))
-    endless = [*row[:-1].tolist(), np.inf]
+    plans = {call.label for call in makers(program.program.output)}
+    endless = [
+        np.inf if table.label in plans else share
+        for table, share in zip(tables, row.tolist(), strict=True)
+    ]
     unlimited = expected_quality(tables, moments_within(tables, endless))
     return float(np.clip(quality / max(unlimited, 1e-9), 0.05, 1.0))
 

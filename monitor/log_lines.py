@@ -142,7 +142,8 @@ class Motion(_Line, frozen=True):
 
 
 class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
-    """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed."""
+    """The first line. fixed: {"shares", "speed", "net"} of a fixed division on the same seed.
+    news: the value that becomes known on the way, and `at` which time."""
 
     schema: str
     name: str
@@ -157,10 +158,14 @@ class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
     gain: float
     scene: SceneFacts | None = None
     fixed: dict[str, Any] | None = None
+    news: dict[str, float | str] | None = None
 
     def worth(self, seconds: float) -> float:
         """The value of completing after so many seconds."""
-        kind, worth, scale = (self.value[name] for name in ("kind", "worth", "seconds"))
+        value = self.value
+        if self.news is not None and seconds >= float(self.news["at"]):
+            value = self.news
+        kind, worth, scale = (value[name] for name in ("kind", "worth", "seconds"))
         return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
 
 
@@ -204,13 +209,25 @@ class EndLine(_Line, frozen=True, tag_field="kind", tag="end"):
     fault: str = ""
 
 
+class RegretLine(_Line, frozen=True, tag_field="kind", tag="regret"):
+    """Other decisions of a frame as (shares, speed, net value of the mission with it): see
+    `monitor.regrets`. It stands behind the end."""
+
+    frame: int
+    forks: tuple[tuple[dict[str, float], float, float], ...]
+
+
 @dataclass(frozen=True)
 class Log:
-    """A mission as it was logged; `end` is None while it goes on or when it was cut off."""
+    """A mission as it was logged; `end` is None while it goes on or when it was cut off.
+
+    regrets: by frame, of missions whose decisions were lived again.
+    """
 
     mission: MissionLine
     frames: tuple[FrameLine, ...] = ()
     end: EndLine | None = None
+    regrets: tuple[RegretLine, ...] = ()
 
     @property
     def promised(self) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,8 @@ import msgspec
 from anytime.errors import AnytimeError
 from anytime.files import LARGEST
 from monitor.endings import Ending
-from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLine
-from monitor.missions import Energy, Value
+from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLine, RegretLine
+from monitor.missions import Energy, News, Value
 
 
 def read_log(path: Path | str) -> Log:
@@ -36,10 +37,20 @@ def read_log(path: Path | str) -> Log:
     mission: MissionLine | None = None
     frames: list[FrameLine] = []
     end: EndLine | None = None
+    regrets: list[RegretLine] = []
     for number, text in enumerate(lines, 1):
         line = _parsed(text, f"{path}:{number}")
         if isinstance(line, MissionLine) and mission is None:
             mission = line
+        elif isinstance(line, RegretLine):
+            if end is None or line.frame != len(regrets) or line.frame >= len(frames):
+                raise AnytimeError(
+                    f"{path}:{number}: the regret of frame {line.frame}; they follow the end, "
+                    "one for each frame in order"
+                )
+            if not line.forks:
+                raise AnytimeError(f"{path}:{number}: a regret is made of one fork or more")
+            regrets.append(line)
         elif mission is None or end is not None or isinstance(line, MissionLine):
             raise AnytimeError(f"{path}:{number}: a log is one mission, its frames and one end")
         elif isinstance(line, EndLine):
@@ -54,13 +65,13 @@ def read_log(path: Path | str) -> Log:
             frames.append(line)
     if mission is None:
         raise AnytimeError(f"{path}: not a log: its first line must be the mission")
-    return Log(mission, tuple(frames), end)
+    return Log(mission, tuple(frames), end, tuple(regrets))
 
 
-def _parsed(text: bytes, where: str) -> MissionLine | FrameLine | EndLine:
+def _parsed(text: bytes, where: str) -> MissionLine | FrameLine | EndLine | RegretLine:
     try:
         content = json.loads(text, object_pairs_hook=_unique, parse_constant=_refused)
-        line = msgspec.convert(content, MissionLine | FrameLine | EndLine)
+        line = msgspec.convert(content, MissionLine | FrameLine | EndLine | RegretLine)
     except msgspec.ValidationError as error:
         raise AnytimeError(f"{where}: {error}") from None
     except json.JSONDecodeError as error:
@@ -79,6 +90,9 @@ def _check_mission(line: MissionLine, where: str) -> None:
         raise AnytimeError(f"{where}: has schema {line.schema!r}, needed is {SCHEMA!r}")
     try:
         Value(**line.value)  # type: ignore[arg-type]
+        if line.news is not None:
+            told = dict(line.news)
+            News(told.pop("at", math.nan), Value(**told))  # type: ignore[arg-type]
         Energy(**line.energy)
     except (TypeError, ValueError) as error:
         raise AnytimeError(f"{where}: {error}") from None

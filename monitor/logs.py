@@ -116,6 +116,8 @@ class LogWriter:
         fixed = fixed or _division(mission.fixed)
         if fixed:
             line["fixed"] = dict(fixed)
+        if mission.news is not None:
+            line["news"] = {"at": mission.news.at, **asdict(mission.news.value)}
         self._write(line)
 
     def frame(self, frame: Frame) -> None:
@@ -124,7 +126,8 @@ class LogWriter:
         if self._mission is None:
             raise AnytimeError(f"{self.path}: write the mission before its frames")
         self._energy += frame.energy
-        value, price = self._mission.value(frame.ended), self._mission.energy.price
+        known = self._mission.known(frame.ended)
+        value, price = known.value(frame.ended), known.energy.price
         story = dict(frame.story)
         belief = story.pop("belief", None)
         line: dict[str, Any] = {

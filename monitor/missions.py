@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -79,6 +79,21 @@ class Energy:
 
 
 @dataclass(frozen=True)
+class News:
+    """What becomes known on the way: from `at` seconds on, the task has another value.
+
+    Times of that value are seconds since the task was presented, as before.
+    """
+
+    at: float
+    value: Value
+
+    def __post_init__(self) -> None:
+        if not 0 < self.at < math.inf:
+            raise AnytimeError(f"news.at is {self.at}; it must be a finite number > 0")
+
+
+@dataclass(frozen=True)
 class Mission:
     """A task for a robot.
 
@@ -86,6 +101,7 @@ class Mission:
     counts only if the goal was reached. speeds: (least, greatest), lengths a second.
     job: seconds of work at the goal. gain: how strongly speed answers to a frame that is ahead or
     behind [ZR93 §5]. fixed: a tuned fixed division (seconds by call, and "speed") to compare with.
+    news: what nobody knows before it comes; the deadline, for instance.
     """
 
     value: Value
@@ -95,6 +111,7 @@ class Mission:
     gain: float = 1.0
     name: str = "mission"
     fixed: Mapping[str, float] = field(default_factory=dict[str, float])
+    news: News | None = None
 
     def __post_init__(self) -> None:
         slow, fast = self.speeds
@@ -103,7 +120,14 @@ class Mission:
         if not 0 <= self.job < math.inf or not 0 <= self.gain < math.inf:
             raise AnytimeError("job and gain must be finite numbers >= 0")
 
+    def known(self, time: float) -> Mission:
+        """The mission as it is known at a time, without what comes later."""
+        if self.news is None:
+            return self
+        value = self.news.value if time >= self.news.at else self.value
+        return replace(self, value=value, news=None)
+
     def net(self, reached: bool, seconds: float, energy: float) -> float:
         """What a mission was worth that ended after `seconds`."""
-        earned = float(self.value(seconds)) if reached else 0.0
+        earned = float(self.known(seconds).value(seconds)) if reached else 0.0
         return earned - self.energy.price * energy

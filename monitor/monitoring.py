@@ -12,8 +12,10 @@ import numpy as np
 from anytime.clocks import Deadline, WallClock
 from anytime.collecting import settled
 from anytime.errors import AnytimeError
+from anytime.programs import makers
 from anytime.results import Fault, Result
 from compiler import CompiledProgram
+from compiler.executing import known_of
 from monitor.bodies import Robot
 from monitor.endings import Ending
 from monitor.failing import Failures, is_sound, last_resort
@@ -97,6 +99,7 @@ class _Life:
         self.promised = float("nan")
         self.job = 0.0
         self.route = self.walked = 0.0
+        self.inputs: Mapping[str, Any] = {}
 
     def live(self) -> Ending:
         plan: Any = None
@@ -109,14 +112,10 @@ class _Life:
             if situation.ending is Ending.REACHED:
                 self.robot.work(self.mission.job)
                 self.job = self.mission.job
-                return (
-                    Ending.REACHED
-                    if self.time() <= self.mission.value.deadline
-                    else Ending.DEADLINE
-                )
+                return Ending.REACHED if self.time() <= self.deadline() else Ending.DEADLINE
             if situation.ending is not None:
                 return situation.ending
-            if self.time() >= self.mission.value.deadline:
+            if self.time() >= self.deadline():
                 return Ending.DEADLINE
             if standing and self.failures.no_plan_in_sight:
                 return Ending.MODULES_FAILED
@@ -159,6 +158,10 @@ class _Life:
         before = state.contract or (self.frames[-1].decision if self.frames else None)
         return before or last_resort(self.monitor.program, self.mission)
 
+    def deadline(self) -> float:
+        """The time from which on the task is worth nothing, as far as it is known now."""
+        return self.mission.known(self.time()).value.deadline
+
     def time(self) -> float:
         """Seconds since the task was presented."""
         return self.robot.clock.now() - self.presented
@@ -195,8 +198,9 @@ class _Life:
         self.robot.complete()
         after = self.robot.situation()
         interrupted = after.interrupted and not standing
-        result = results.get(self.monitor.program.program.output.label)
-        plan = result.value if result else None
+        output = self.monitor.program.program.output
+        known = known_of(output, results, self.inputs) if results else None
+        plan = known.value if known else None
         self.frames.append(
             Frame(
                 index=len(self.frames),
@@ -271,7 +275,7 @@ class _Life:
         rng = np.random.default_rng([self.seed, len(self.frames)])
         began = self.time()
         try:
-            inputs = self.robot.inputs()
+            self.inputs = inputs = self.robot.inputs()
         except ConnectionError:
             raise
         except Exception as error:
@@ -325,10 +329,10 @@ class _Life:
 
     def advertised(self, label: str, results: Mapping[str, Result]) -> float | None:
         """What the rhythm lets expect of the estimate of a plan; None for other calls."""
-        labels = self.monitor.program.labels
-        if self.monitor.rhythm is None or label != labels[-1]:
+        plans = [call.label for call in makers(self.monitor.program.program.output)]
+        if self.monitor.rhythm is None or label not in plans:
             return None
-        return self.monitor.rhythm.advertised(results[labels[0]].elapsed)
+        return self.monitor.rhythm.advertised(results[self.monitor.program.labels[0]].elapsed)
 
     def report(self, ending: Ending, fault: str) -> Report:
         seconds = self.time()
@@ -343,7 +347,7 @@ class _Life:
             ending=ending,
             promised=self.promised,
             net=self.mission.net(reached, seconds, energy),
-            earned=float(self.mission.value(seconds)) if reached else 0.0,
+            earned=float(self.mission.known(seconds).value(seconds)) if reached else 0.0,
             seconds=seconds,
             energy=energy,
             job=self.job,

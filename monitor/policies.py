@@ -58,6 +58,18 @@ class Expected:
 
 
 @dataclass(frozen=True)
+class Informed:
+    """Two policies, one for what is known before a time and one for what is known from it on."""
+
+    at: float
+    before: Policy
+    after: Policy
+
+    def __call__(self, state: State) -> Decision:
+        return (self.before if state.time < self.at else self.after)(state)
+
+
+@dataclass(frozen=True)
 class Constant:
     """The same division and speed in every frame."""
 

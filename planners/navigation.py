@@ -109,9 +109,11 @@ def sub_goal(path: Path, place: Place, cost: NDArray[np.uint8]) -> tuple[Cell, f
 
 
 def plan_frame(
-    sensed: SensedMap | None, place: Place
+    sensed: SensedMap | None, place: Place, weight: float = ROUTE_WEIGHT
 ) -> Iterator[tuple[float, FramePlan | NoWay | None]]:
     """Plan a frame in steps of (work, a better plan or None).
+
+    weight: of the search for the route across the whole map, >= 1.
 
     Work counts node expansions, with 1/256 for every cell summed.
     """
@@ -120,7 +122,7 @@ def plan_frame(
         belief.update(sensed)
     cost = travel_cost(belief)
     blocked = cost[place.goal] == IMPASSABLE or cost[place.start] == IMPASSABLE
-    way = None if blocked else route(cost, place.start, place.goal, ROUTE_WEIGHT)
+    way = None if blocked else route(cost, place.start, place.goal, weight)
     if way is None:
         yield 0.0, NoWay()
         return

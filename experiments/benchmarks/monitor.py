@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from experiments import shipped
 from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.monitor_gate import gate_figures
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
+from experiments.benchmarks.monitor_news import news_figures
 from experiments.benchmarks.monitor_traces import trace_figures
 from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
 from monitor.certainty import resolve
@@ -42,10 +45,8 @@ MISSIONS = 5_000  # that check each computed worth
 TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
-LATER = {
-    "gate.found": "there is no value gate yet",
-    "gate.false_alarms": "there is no value gate yet",
-}
+TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
+NEWS = 60  # missions in which a deadline becomes known
 
 
 def measure(
@@ -59,7 +60,7 @@ def measure(
 ) -> Benchmark:
     """All figures; those of `traces.` if a folder is given or `$ANYTIME_TRACES` or the usual place
     has one."""
-    missing = dict(LATER)
+    missing: dict[str, str] = {}
     settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
     figures: dict[str, float | int | None] = {}
     found: dict[str, list[float]] = {}
@@ -91,6 +92,13 @@ def measure(
     progress("forks")
     briefing = brief(read_mission(shipped.mission_path()), shipped.profiles(), BRIEF)
     figures |= fork_figures(briefing, seed)
+    of_gate, gate_settings = gate_figures(seed, QUICK_TRIALS if quick else TRIALS, progress)
+    figures |= of_gate
+    settings |= gate_settings
+    progress("a knob")
+    figures |= knob_figures(seed)
+    progress("a deadline that becomes known on the way")
+    figures |= news_figures(seed, NEWS if not quick else QUICK_TRIALS)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()

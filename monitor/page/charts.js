@@ -188,3 +188,49 @@ function drawRivals() {
     svg.append(pressable(group, `${each.name}: ${each.state}`, () => show(index)));
   });
 }
+// Missions lived again with other decisions: the regret of each frame, and the forks of this one.
+function drawRegrets() {
+  const it = run();
+  $("regretted").hidden = !it.regretted;
+  if (!it.regretted) return;
+  drawRegret(it); drawForks(it);
+}
+function drawRegret(it) {
+  const height = 190, [svg, width] = picture("regret", height, "Regret of each frame");
+  const top = 40, bottom = height - 32, step = width / it.frames.length, forked = it.frames.filter(each => each.forks);
+  const most = Math.max(1e-9, ...forked.map(each => each.forks.regret));
+  const worst = [...forked].sort((a, b) => b.forks.regret - a.forks.regret).slice(0, 3).filter(each => each.forks.regret > 0);
+  forked.forEach(each => {
+    const index = each.index, regret = each.forks.regret, tall = (bottom - top) * regret / most, group = make("g");
+    group.append(make("rect", {x: index * step, y: top - 20, width: step, height: bottom - top + 20, fill: index === at ? "#fbe9c6" : "transparent"}),
+      make("rect", {x: index * step + step * .14, y: bottom - tall, width: Math.max(1, step * .72), height: tall, fill: RED}));
+    if (worst.includes(each)) group.append(text((index + .5) * step, bottom - tall - 4, index, {"text-anchor": "middle", class: "strong"}));
+    svg.append(pressable(group, `frame ${index}: ${number(regret)} more by the best of ${each.forks.made.length} others`, () => go(index)));
+  });
+  svg.append(make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK}), text(0, 11, `net value that the best other decision would have added, at most ${number(most > 1e-9 ? most : 0)}`), text(width, height - 2, "frame", {"text-anchor": "end"}));
+  for (const mark of ticks(0, it.frames.length - 1, 8)[0]) if (Number.isInteger(mark)) svg.append(text((mark + .5) * step, bottom + 15, mark, {"text-anchor": "middle"}));
+}
+function drawForks(it) {
+  const now = frame(), forks = now.forks;
+  if (!forks) { $("forks").replaceChildren(); return; }
+  const height = 190, [svg, width] = picture("forks", height, "Net value of the mission with other decisions in this frame");
+  const top = 22, bottom = height - 32, gutter = 40, middle = (width - gutter + 18) / 2, best = Math.max(...forks.made.map(one => one.net));
+  const nets = [it.net, ...forks.made.map(one => one.net)], low = Math.min(...nets), high = Math.max(...nets), pad = (high - low || 1) * .1;
+  const Y = value => bottom - (bottom - top) * (value - low + pad) / (high - low + 2 * pad);
+  const [rows, digits] = ticks(low - pad, high + pad, 4);
+  for (const mark of rows) svg.append(make("path", {d: `M${gutter} ${Y(mark)}H${width}`, stroke: RULE}), text(gutter - 6, Y(mark) + 4, mark.toFixed(digits), {"text-anchor": "end"}));
+  svg.append(text(0, 11, "net value of the whole mission: ● lived, ○ forked"), make("path", {d: `M${gutter} ${Y(it.net)}H${width}`, stroke: INK, "stroke-dasharray": "4 3"}));
+  const panel = (from, name, own, points) => {
+    const xs = [own, ...points.map(one => one.at)], least = Math.min(...xs), most = Math.max(...xs), room = middle - 34;
+    const X = value => from + 8 + room * (value - least) / (most - least || 1);
+    for (const one of points) svg.append(pressable(make("circle", {cx: X(one.at), cy: Y(one.net), r: one.net === best && best > it.net ? 5 : 3.4, fill: "#fff", stroke: one.net > it.net ? RED : INK, "stroke-width": one.net === best && best > it.net ? 2.4 : 1.2}), one.text, () => {}));
+    svg.append(make("circle", {cx: X(own), cy: Y(it.net), r: 4.5, fill: INK}));
+    const [marks, places] = ticks(least, most, 4);
+    for (const mark of marks) if (X(mark) < from + room - 4 || mark === marks[0]) svg.append(text(X(mark), bottom + 15, mark.toFixed(places), {"text-anchor": "middle"}));
+    svg.append(text(from + 8 + room, height - 2, name, {"text-anchor": "end"}));
+  };
+  const decided = now.moments[0], timed = forks.made.filter(one => one.timed);
+  if (timed.length) panel(gutter, "seconds of contract", decided.contract, timed.map(one => ({...one, at: one.contract})));
+  const driven = forks.made.filter(one => !one.timed);
+  if (driven.length) panel(timed.length ? gutter + middle : gutter, it.unit, decided.speed, driven.map(one => ({...one, at: one.speed})));
+}

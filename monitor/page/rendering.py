@@ -13,7 +13,7 @@ from anytime.files import write_atomically
 from anytime.pictures import duration, number
 from monitor.log_lines import FrameLine, Log, MomentLine
 from monitor.logs import plain
-from monitor.page import answers, motion
+from monitor.page import answers, motion, regretted
 from monitor.page.losses import costliest, loss_of, waterfall
 
 _SCRIPTS = ("drawing.js", "map.js", "motion.js", "charts.js", "replay.js")
@@ -106,6 +106,7 @@ def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
         "profile": answers.profile(log),
         "compared": answers.compared(log),
         "job": end.job if end else 0.0,
+        "regretted": regretted.sentence(log),
         "opens": motion.opening(log),
         "switching": motion.switching(log),
     }
@@ -156,6 +157,8 @@ def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> di
         "plan": frame.plan,
         "belief": [box.row, box.column, box.rows, box.columns, box.levels] if box else None,
         "motion": motion.drawn(frame),
+        "forks": regretted.forks(log, frame),
+        "here_regretted": regretted.here(log, frame),
         "calls": [
             {
                 "label": call.label,

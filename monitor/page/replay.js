@@ -23,7 +23,8 @@ function draw() {
   write("sentence", one.headline); write("why", one.why); write("fixed", one.fixed); write("price", one.price);
   write("here", now.here_lost); write("here-seen", now.here_seen);
   write("switching", it.switching);
-  drawLegend(); drawMap(); drawObjective(); drawCurve(); drawShares(); drawLanes(); drawWaterfall(); drawFrames(); drawSeen(); drawRivals();
+  write("regretted-all", it.regretted); write("here-regretted", now.here_regretted);
+  drawLegend(); drawMap(); drawObjective(); drawCurve(); drawShares(); drawLanes(); drawWaterfall(); drawFrames(); drawSeen(); drawRivals(); drawRegrets();
 }
 function drawTabs() {
   if (data.runs.length < 2) return;

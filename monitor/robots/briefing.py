@@ -22,7 +22,7 @@ from monitor.forking import forked
 from monitor.inter_frame import Contracts, Spread, compiled_contracts, pinned_contracts
 from monitor.logs import Floor, LogWriter
 from monitor.monitoring import Listener, Monitor
-from monitor.policies import Expected, Paper, Policy, constant
+from monitor.policies import Expected, Informed, Paper, Policy, constant
 from monitor.reports import Frame, Report
 from monitor.rhythms import Rhythm
 from monitor.robots.faulty import FaultyRobot, faulty_program
@@ -93,6 +93,11 @@ class Briefing:
 
     def _policy(self, name: str) -> Policy:
         mission = self.grid.mission
+        news = mission.news
+        if news is not None:  # what comes is not foreseen, but what to do then is prepared
+            parts = (mission.known(time) for time in (0.0, news.at))
+            grids = (replace(self.grid, mission=part) for part in parts)
+            return Informed(news.at, *(replace(self, grid=grid)._policy(name) for grid in grids))
         if name == "paper":
             return Paper(mission, self.contracts, self.rhythm)
         if name == "fixed":
@@ -232,8 +237,17 @@ def brief(
 
     memory: where what the missions lived before it teach is kept for the next briefing.
     """
+    return brief_with(compile(navigate, library.on(grid.machine)), grid, effort, memory)
+
+
+def brief_with(
+    program: CompiledProgram,
+    grid: GridMission,
+    effort: Effort | None = None,
+    memory: Memory = NO_MEMORY,
+) -> Briefing:
+    """Measure a mission's rhythm with a program that is compiled already; else as `brief`."""
     effort = effort or effort_for(grid.scene)
-    program = compile(navigate, library.on(grid.machine))
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)
     seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)

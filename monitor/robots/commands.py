@@ -1,4 +1,4 @@
-"""Commands of the robots: run a monitored mission, serve a simulated NAO."""
+"""Commands of the robots: run a monitored mission, compare, serve a simulated NAO."""
 
 from __future__ import annotations
 
@@ -40,11 +40,27 @@ def declare(commands: Any) -> None:
     parser.add_argument("--clock", choices=["work", "wall"], default="work", help="work repeats")
     parser.add_argument("--library", type=folder, metavar="DIR", help="default: shipped profiles")
     parser.add_argument(
+        "--regret", type=natural, default=0, metavar="N", help="live N other decisions a frame, too"
+    )
+    parser.add_argument(
         "--log",
         type=folder,
         default=Path("anytime-run"),
         metavar="DIR",
         help="for the log and the page (default anytime-run)",
+    )
+
+    summary = "what a change of profiles costs in the value of a mission"
+    parser = add_command(commands, "compare", compare_sides, summary)
+    for name in ("before", "after"):
+        parser.add_argument(name, type=Path, help="a folder of profiles, or a schedule")
+    parser.add_argument("--mission", type=Path, required=True, metavar="MISSION.toml")
+    parser.add_argument(
+        "--tolerance",
+        type=_tolerated,
+        default=0.0,
+        metavar="V",
+        help="loss put up with (default 0)",
     )
 
     parser = add_command(commands, "nao-sim", nao_sim, "serve a simulated NAO over NAOqi")
@@ -69,6 +85,7 @@ def run(options: argparse.Namespace) -> Answer:
     from anytime.faults import FaultyClock, read_schedule
     from monitor.logs import read_log
     from monitor.page import write_page
+    from monitor.regrets import log_regrets, regrets
     from monitor.robots.briefing import POLICIES, brief
     from monitor.robots.faulty import kinds_of
     from monitor.robots.grid_missions import read_mission
@@ -87,6 +104,11 @@ def run(options: argparse.Namespace) -> Answer:
         raise AnytimeError(f"--drift {options.drift} is for a NAO's scene, not for a grid mission")
     if options.faults is not None and not options.faults.is_file():
         raise AnytimeError(f"{options.faults}: no such file of faults")
+    if options.regret and (options.regret < 2 or options.faults or options.clock == "wall"):
+        raise AnytimeError(
+            f"--regret {options.regret}: it takes 2 or more, and a mission that can be lived "
+            "again: without --faults, on the work clock"
+        )
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
     start, goal = options.start, options.goal
@@ -106,6 +128,11 @@ def run(options: argparse.Namespace) -> Answer:
             clock = FaultyClock(grid.machine, faults)
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed, clock=clock, log=log, faults=faults)
+    if options.regret:
+        shares = briefing.contracts.shares
+        with progress("living other decisions") as bar:
+            found = regrets(report, grid.mission, shares, count=options.regret, progress=bar)
+        log_regrets(log, found)
     page = write_page([read_log(log)], options.log / "mission.html")
     return Answer(
         f"{report!r}\n{_wide(grid)}\nlog {log}, page {page}",
@@ -122,6 +149,33 @@ def run(options: argparse.Namespace) -> Answer:
         },
         0 if report else 1,
     )
+
+
+def compare_sides(options: argparse.Namespace) -> Answer:
+    """What a change costs, with its 95 % interval; exit code 1 if a loss is shown."""
+    from monitor.robots.comparing import compare
+    from monitor.robots.grid_missions import read_mission
+    from monitor.robots.lessons import user_memory
+
+    grid = read_mission(options.mission)
+    with progress("living the mission"):
+        found = compare(
+            options.before, options.after, grid, options.tolerance, memory=user_memory()
+        )
+    figures = {
+        "before": found.before,
+        "after": found.after,
+        "loss": found.loss,
+        "loss_low": found.low,
+        "loss_high": found.high,
+        "tolerance": found.tolerance,
+        "shown": found.shown,
+        "modules": {
+            name: {"slower": shift.slower, "quality": shift.quality, "loss": found.parts[name]}
+            for name, shift in found.shifts.items()
+        },
+    }
+    return Answer(repr(found), figures, 1 if found.shown else 0)
 
 
 def _run_nao(options: argparse.Namespace) -> Answer:
@@ -224,6 +278,10 @@ def _ends(floor: Path | None, index: int) -> tuple[tuple[int, int], tuple[int, i
     if not 0 <= index < len(scenarios):
         raise AnytimeError(f"{file} has scenarios 0 to {len(scenarios) - 1}, not {index}")
     return scenarios[index].start, scenarios[index].goal
+
+
+def _tolerated(text: str) -> float:
+    return 0.0 if text.strip() in ("0", "0.0") else positive(text)
 
 
 def _cell(text: str) -> tuple[int, int]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
-from monitor.missions import Energy, Mission, Value
+from monitor.missions import Energy, Mission, News, Value
 from monitor.robots.grid import Scene
 from planners.path_finding import Cell
 from sensing import corner_to_corner, read_map
@@ -41,6 +41,13 @@ class _Mission(_Section):
 
 
 class _Value(_Section):
+    kind: str
+    worth: float
+    seconds: float
+
+
+class _News(_Section):
+    at: float
     kind: str
     worth: float
     seconds: float
@@ -79,6 +86,7 @@ class _File(_Section):
     energy: _Energy
     world: _World
     vision: _Vision = msgspec.field(default_factory=_Vision)
+    news: _News | None = None
     machine: dict[str, float] = msgspec.field(default_factory=dict)
     fixed: dict[str, float] = msgspec.field(default_factory=dict)
 
@@ -128,6 +136,7 @@ def read_mission(
             gain=file.mission.gain,
             name=file.mission.name if not replaced else f"{file.mission.name} on {floor.name}",
             fixed=file.fixed,
+            news=_news(file.news),
         )
         _known("machine", file.machine, REFERENCE.rates)
         _known("fixed", file.fixed, [*REFERENCE.rates, "speed"])
@@ -137,6 +146,13 @@ def read_mission(
     except AnytimeError as error:
         raise AnytimeError(f"{path}: {error}") from None
     return GridMission(mission, scene, machine)
+
+
+def _news(table: _News | None) -> News | None:
+    if table is None:
+        return None
+    value = Value(table.kind, table.worth, table.seconds)  # pyright: ignore[reportArgumentType]
+    return News(table.at, value)
 
 
 def _parse(path: Path) -> _File:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from anytime import AnytimeError
 from experiments import shipped
-from monitor import Energy, Mission, State, Value
+from monitor import Energy, Mission, News, State, Value
 from monitor.choosing import Chosen, judge_policies, tuned_division
 from monitor.logs import write_log
 from monitor.policies import constant
+from monitor.regrets import regrets
 from monitor.robots.briefing import QUICK, brief
 from monitor.robots.grid import Scene
 from monitor.robots.grid_missions import REFERENCE, GridMission
@@ -102,3 +105,33 @@ def test_what_cannot_be_forked_is_refused_in_one_line(briefing, fork, message):
 def test_a_mission_that_nobody_can_live_again_says_so(report):
     with pytest.raises(AnytimeError, match="cannot be lived again"):
         report.fork(0, see=1.0)
+
+
+def test_who_hears_of_a_deadline_on_the_way_keeps_it_more_often(briefing):
+    news = News(3.0, Value("hard", 100.0, 16.0))
+    other = replace(briefing.grid, mission=replace(MISSION, news=news))
+    told = replace(briefing, grid=other)
+    monitor = told.monitor("expected")
+    deaf = replace(monitor, policy=monitor.policy.before)
+    informed, without = (
+        [told.live(each, seed).net for seed in range(8)] for each in (monitor, deaf)
+    )
+    assert np.mean(informed) > np.mean(without)
+    report = told.live(monitor, 2)
+    same = report.fork(1, **report.frames[1].decision.shares)
+    assert same.net == report.net
+
+
+def test_the_regret_of_a_decision_is_what_the_best_of_its_forks_was_worth_more(briefing):
+    report = briefing.live(briefing.monitor("table"), 5)
+    found = regrets(report, MISSION, briefing.contracts.shares, count=2)
+    assert [regret.frame for regret in found] == [frame.index for frame in report.frames]
+    for regret, frame in zip(found, report.frames, strict=True):
+        decided = frame.decision
+        for fork in regret.forks:
+            assert (fork.shares, fork.speed) != (decided.shares, decided.speed)
+        assert regret.regret == max(0.0, *(fork.net - report.net for fork in regret.forks))
+    best = found[1].best
+    assert report.fork(1, speed=best.speed, **best.shares).net == best.net
+    with pytest.raises(AnytimeError, match="it takes 2 or more"):
+        regrets(report, MISSION, briefing.contracts.shares, count=1)

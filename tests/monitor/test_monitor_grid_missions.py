@@ -56,3 +56,11 @@ def test_the_camera_can_take_the_place_of_the_papers_sensor(tmp_path):
 
     text = GOOD.replace('kind = "parametric"', 'kind = "camera"')
     assert isinstance(read_mission(written(tmp_path, text)).scene.device, Camera)
+
+
+def test_news_is_read_and_a_time_that_is_none_is_refused(tmp_path):
+    news = '[news]\nat = 20.0\nkind = "hard"\nworth = 100.0\nseconds = 60.0\n'
+    mission = read_mission(written(tmp_path, GOOD + news)).mission
+    assert (mission.known(0.0).value.kind, mission.known(30.0).value.kind) == ("soft", "hard")
+    with pytest.raises(AnytimeError, match=r"news\.at is -1\.0; it must be a finite number > 0"):
+        read_mission(written(tmp_path, GOOD + news.replace("20.0", "-1.0")))

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from anytime.errors import AnytimeError
+from monitor import News, Value
 from monitor.log_lines import LEVELS
 from monitor.logs import Floor, LogWriter, plain, read_log, write_log
 
@@ -51,6 +52,16 @@ def test_what_is_written_during_a_mission_is_what_is_written_after_it(
         writer.end(report)
     after = write_log(tmp_path / "after.jsonl", mission, floor, report)
     assert after.read_bytes() == writer.path.read_bytes()
+
+
+def test_news_is_part_of_a_log_and_of_what_completing_is_worth(tmp_path, mission, floor, report):
+    told = replace(mission, news=News(5.0, Value("hard", 30.0, 8.0)))
+    line = read_log(write_log(tmp_path / "a.jsonl", told, floor, report)).mission
+    assert [line.worth(time) for time in (0.0, 6.0, 9.0)] == [100.0, 30.0, 0.0]
+    path = tmp_path / "a.jsonl"
+    path.write_bytes(path.read_bytes().replace(b'"at":5.0', b'"at":-5.0', 1))
+    with pytest.raises(AnytimeError, match=r"a\.jsonl:1: news\.at is -5"):
+        read_log(path)
 
 
 def test_facts_of_the_wall_lie_beside_the_log(tmp_path, mission, floor, report):

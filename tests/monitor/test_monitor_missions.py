@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from anytime import AnytimeError
-from monitor import Energy, Mission, Value
+from monitor import Energy, Mission, News, Value
 
 KINDS = st.sampled_from(["linear", "exponential", "soft", "hard"])
 POSITIVE = st.floats(0.1, 1e4)
@@ -50,3 +50,14 @@ def test_value_counts_only_if_the_goal_was_reached_and_energy_always():
 def test_constants_that_make_no_sense_are_named(make, told):
     with pytest.raises(AnytimeError, match=told):
         make()
+
+
+@given(st.floats(0, 200), st.floats(0, 50))
+def test_what_is_known_at_a_time_is_what_counts_then(time, energy):
+    before, after = Value("soft", 100.0, 80.0), Value("hard", 40.0, 60.0)
+    mission = Mission(before, Energy(0.2, 0.08, 0.03), news=News(20.0, after))
+    known = mission.known(time)
+    assert known.news is None
+    assert known.value == (after if time >= 20.0 else before)
+    assert mission.net(True, time, energy) == known.net(True, time, energy)
+    assert known.known(time) == known

@@ -19,6 +19,7 @@ from monitor.endings import Ending
 from monitor.logs import LogWriter, read_log, write_log
 from monitor.page import page_data, render, write_page
 from monitor.page.losses import costliest, waterfall
+from monitor.regrets import Fork, Regret, log_regrets
 from monitor.serving import serve
 
 QUESTIONS = ("why", "fixed", "losses", "profile", "price")
@@ -131,6 +132,32 @@ def test_prices_that_were_logged_name_who_pays(tmp_path, mission, floor, report)
     assert moment["price"].startswith("find_path pays most for another millisecond")
 
 
+def test_regrets_stand_behind_the_end_of_a_log_and_are_told_in_numbers(
+    tmp_path, mission, floor, report
+):
+    path = write_log(tmp_path / "a.jsonl", mission, floor, report)
+    bare = page_data([read_log(path)])["runs"][0]
+    assert (bare["regretted"], bare["frames"][0]["forks"]) == ("", None)
+    other = {"see": 0.2, "find_path": 0.3}
+    log_regrets(
+        path,
+        tuple(
+            Regret(
+                index, report.net, (Fork(other, 4.0, report.net + index - 4), Fork(other, 5.0, 1.0))
+            )
+            for index in range(6)
+        ),
+    )
+    run = page_data([read_log(path)])["runs"][0]
+    assert run["regretted"].startswith("12 missions were lived again")
+    assert "most in frame 5, 1.00; in 5 of 6 frames none was better" in run["regretted"]
+    assert [frame["forks"]["regret"] for frame in run["frames"]] == pytest.approx([0] * 5 + [1.0])
+    assert "see 200 ms would have ended at" in run["frames"][5]["here_regretted"]
+    log_regrets(path, (Regret(0, 1.0, (Fork(other, 4.0, 1.0),)),))
+    with pytest.raises(AnytimeError, match="follow the end, one for each frame in order"):
+        read_log(path)
+
+
 def test_a_log_without_frames_or_map_still_makes_a_page(tmp_path, mission, report):
     with LogWriter(tmp_path / "a.jsonl") as writer:
         writer.mission(mission, policy="expected", seed=3, labels=("see",))
@@ -179,6 +206,26 @@ def test_it_opens_at_the_costliest_decision_and_keys_lead_on(browser, logs, tmp_
     assert where().startswith(f"Frame {worst[1]}, 6 in all")
     browser.open(page.as_uri() + "#4")
     assert where().startswith("Frame 4, 6 in all")
+    assert browser.errors == []
+
+
+@pytest.mark.browser
+def test_a_press_on_a_regret_shows_what_else_was_lived_there(
+    browser, tmp_path, mission, floor, report
+):
+    path = write_log(tmp_path / "a.jsonl", mission, floor, report)
+    decided = dict(report.frames[0].decision.shares)
+    forks = (Fork({**decided, "see": 0.2}, 4.0, report.net + 2), Fork(decided, 2.0, report.net - 1))
+    log_regrets(path, tuple(Regret(index, report.net, forks) for index in range(6)))
+    page = write_page([read_log(path)], tmp_path / "a.html")
+    browser.errors.clear()
+    browser.open(page.as_uri())
+    assert not browser.run("document.getElementById('regretted').hidden")
+    browser.run("document.querySelectorAll('#regret .hit')[3].dispatchEvent(new Event('click'))")
+    assert browser.run("location.hash") == "#3"
+    assert browser.run("document.querySelectorAll('#forks .hit').length") == 2
+    told = browser.run("document.getElementById('here-regretted').textContent")
+    assert "2.00 more; 1 of 2 would have been worse" in told
     assert browser.errors == []
 
 

@@ -11,7 +11,7 @@ from monitor import Decision, Energy, Mission, Situation, State, Value
 from monitor.calibration import spread_of
 from monitor.inter_frame import Contracts, Spread, best_contract, foresee
 from monitor.intra_frame import keep_course
-from monitor.policies import Expected, Paper, constant
+from monitor.policies import Expected, Informed, Paper, constant
 from monitor.rhythms import Lived, Rhythm, rhythm_of
 
 MISSION = Mission(Value("linear", 100, 200), Energy(0.2, 0.1, 0.03))
@@ -129,3 +129,13 @@ def test_what_a_mission_promises_at_its_beginning_is_held_against_whole_missions
     spread = spread_of([mission] * 10)
     assert spread.at(100.0) == pytest.approx(1.3)
     assert spread.at(85.0) == pytest.approx(1.0)
+
+
+def test_nobody_decides_by_news_before_it_comes():
+    slow, brisk = (constant({"see": 1.0}, speed) for speed in (1.0, 5.0))
+    informed = Informed(20.0, slow, brisk)
+    speeds = [
+        informed(State("frame", time, Situation(0.0, 40.0, 0.0), standing=True)).speed
+        for time in (0.0, 19.9, 20.0, 50.0)
+    ]
+    assert speeds == [1.0, 1.0, 5.0, 5.0]

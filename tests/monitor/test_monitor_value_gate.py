@@ -1,0 +1,77 @@
+"""The value gate: a loss is shown where there is one, and only there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anytime.__main__ import main
+from compiler import compile
+from experiments import shipped
+from monitor import Energy, Mission, Value
+from monitor.calibration import Steady
+from monitor.rhythms import Lived
+from monitor.robots.navigation import navigate
+from monitor.shifts import GROUPS, Shift, Shifts
+from monitor.states import Situation
+from monitor.value_gate import Foresight, gate
+
+MISSION = Mission(Value("linear", 100.0, 90.0), Energy(0.2, 0.08, 0.03), job=1.0, name="ward")
+ROUTE, FRAMES = 100.0, 10
+
+
+def lived(sensing, seed):
+    """A mission that walks less the longer it looks."""
+    walked = ROUTE * (1.2 + 0.8 * np.exp(-sensing / 2) + 0.05 * np.sin(seed))
+    return Lived(sensing, ROUTE, walked, 0.9 * walked, FRAMES, 1, 0.8)
+
+
+@pytest.fixture(scope="module")
+def foresight():
+    program = compile(navigate, shipped.profiles())
+    seeds = range(2 * GROUPS)
+    steady = tuple(
+        Steady((time, 0.3), tuple(lived(time, seed) for seed in seeds), ())
+        for time in (0.5, 1.5, 2.5, 4.0, 6.0)
+    )
+    situation = Situation(0.0, ROUTE, 0.0)
+    ratios = np.array([0.9, 1.0, 1.1])
+    return Foresight(MISSION, situation, steady, ratios, tuple(program.tables), program.frontier)
+
+
+def test_without_a_change_nothing_is_lost(foresight):
+    found = gate(foresight, Shifts({"see": Shift(), "find_path": Shift()}))
+    assert found.loss == 0
+    assert not found.shown
+
+
+def test_slower_is_worth_less_and_better_is_worth_more(foresight):
+    for label in ("see", "find_path"):
+        paces = [foresight.worth({label: Shift(slower)}) for slower in (0.5, 1.0, 1.5, 3.0)]
+        ends = [foresight.worth({label: Shift(quality=best)}) for best in (0.8, 0.9, 1.0)]
+        assert paces == sorted(paces, reverse=True)
+        assert ends == sorted(ends)
+    assert foresight.worth({"see": Shift(3.0)}) < foresight.worth({}) - 1
+
+
+def test_a_loss_is_shown_if_it_is_clear_of_the_noise_and_beyond_the_tolerance(foresight):
+    slow = {"see": Shift(2.0)}
+    clear = Shifts(slow, [slow] * GROUPS)
+    noisy = Shifts(slow, [{"see": Shift(2.0 + (-1) ** out)} for out in range(GROUPS)])
+    found = gate(foresight, clear)
+    assert found.low < found.loss < found.high
+    assert found.shown
+    assert not gate(foresight, noisy).shown
+    assert not gate(foresight, clear, tolerance=found.high).shown
+    assert found.parts["see"] == pytest.approx(found.loss)
+
+
+def test_the_command_refuses_what_cannot_be_compared_in_one_line(tmp_path, capsys):
+    shipped.profiles().save(tmp_path / "before")
+    (tmp_path / "empty").mkdir()
+    mission = ["--mission", str(shipped.mission_path())]
+    for after in ("empty", "missing.schedule"):
+        code = main(["compare", str(tmp_path / "before"), str(tmp_path / after), *mission])
+        told = capsys.readouterr()
+        assert (code, told.out, told.err.count("\n")) == (2, "", 1)
+    assert "one is a folder" in told.err
