@@ -135,7 +135,7 @@ def counted(
     for place, (call, stage) in enumerate(zip(program.calls, stages, strict=True)):
         cells = LEVELS if place else 1
         levels = np.concatenate([stage.runs(float(QUALITIES[c]), runs, rng) for c in range(cells)])
-        weights = np.kron(np.eye(cells), np.full(runs, 1 / runs))
+        weights = np.repeat(np.eye(cells), runs, axis=1) / runs
         chances = np.stack([weights @ (levels == level) for level in range(LEVELS)], axis=-1)
         feeds: tuple[str, ...] = ()
         if place:

@@ -112,7 +112,7 @@ def test_it_is_the_best_of_all_ways_of_stopping(seed):
     assert plan.value == pytest.approx(expected, abs=1e-9)
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(st.integers(0, 2**32), st.sampled_from(["branch", "loop", "choose", "tests"]), st.booleans())
 def test_it_is_never_worth_less_than_deciding_at_boundaries(seed, kind, costly):
     rng = np.random.default_rng(seed)
@@ -132,6 +132,7 @@ def test_it_is_never_worth_less_than_deciding_at_boundaries(seed, kind, costly):
         assert inside >= divide(tables, objective).promise(budget) - 1e-9
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 2**32), st.booleans())
 def test_where_levels_say_nothing_there_is_nothing_to_watch_for(seed, costly):
     """Runs that are all alike until their last result."""
@@ -155,6 +156,7 @@ def test_where_levels_say_nothing_there_is_nothing_to_watch_for(seed, costly):
     assert inside.value == pytest.approx(plain.value, abs=1e-9)
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 2**32))
 def test_transitions_carry_the_table_from_moment_to_moment(seed):
     for table in pair(np.random.default_rng(seed)):
