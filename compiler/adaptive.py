@@ -47,7 +47,11 @@ def adapt(
     """
     check(program, seen, objective)
     visible = [as_seen(program, table) for table in tables]
-    steps = {table.label: transitions(table) for table in watched(program, visible, seen)}
+    steps = {
+        table.label: transitions(table)
+        for table in watched(program, visible, seen)
+        if table.chances.size * TICKS <= STATES
+    }
     budgets = np.geomspace(frontier.budgets[0], frontier.budgets[-1], BUDGETS)
     plans = tuple(plan_for(program, visible, float(b), objective, steps) for b in budgets)
     needed = {name for plan in plans for choice in plan.choices for name in choice.state}
@@ -108,10 +112,10 @@ def plan_for(
                 f"adaptive=True would have to remember {len(after)} results at once for "
                 f"{table.label}; join some in a module"
             )
-        own = None if steps is None else steps.get(table.label)
-        watch = own is not None and size * len(table.times) * len(table.levels) * TICKS <= STATES
-        within = None
-        if own is not None and watch:
+        own, within = None, None
+        if steps is not None and size * len(table.times) * len(table.levels) * TICKS <= STATES:
+            own = steps.get(table.label)  # else it is decided when it begins alone
+        if own is not None:
             patient = table is output and objective.timeless
             state, value, moments, within = _watch(table, own, after, later, tick, patient)
         else:

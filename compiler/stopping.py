@@ -58,7 +58,7 @@ def transitions(table: Table) -> Floats:
         _smooth(chances)
         _restore(chances, now, then)
         chances /= np.where(now > 0, now, 1.0)[..., None]
-        _filled(chances, now)
+        _fill(chances, now)
     return found.reshape(len(found), *cells, size, size)
 
 
@@ -80,16 +80,14 @@ def _restore(chances: Floats, now: Floats, then: Floats) -> None:
         total = chances.sum(axis=axis)
         share = np.where(total > 0, wanted / np.where(total > 0, total, 1.0), 0.0)
         chances *= np.expand_dims(share if axis == -1 else np.minimum(share, 1.0), axis)
-    left, lacking = now - chances.sum(axis=-1), then - chances.sum(axis=-2)
-    ends = np.cumsum(np.maximum(left, 0.0), axis=-1)[..., None]
-    others = np.cumsum(np.maximum(lacking, 0.0), axis=-1)[..., None, :]
-    begin = np.maximum(
-        ends - np.maximum(left, 0.0)[..., None], others - np.maximum(lacking, 0.0)[..., None, :]
-    )
-    chances += np.maximum(np.minimum(ends, others) - begin, 0.0)
+    left = np.maximum(now - chances.sum(axis=-1), 0.0)
+    lacking = np.maximum(then - chances.sum(axis=-2), 0.0)
+    leaves, comes = np.cumsum(left, axis=-1)[..., None], np.cumsum(lacking, axis=-1)[..., None, :]
+    begins = np.maximum(leaves - left[..., None], comes - lacking[..., None, :])
+    chances += np.maximum(np.minimum(leaves, comes) - begins, 0.0)
 
 
-def _filled(chances: Floats, mass: Floats) -> None:
+def _fill(chances: Floats, mass: Floats) -> None:
     """Fill the rows of levels at which no run was, [cells, L, L] in place."""
     chances[mass.sum(axis=-1) == 0] = np.eye(chances.shape[-1])  # without an input nothing changes
     cell, level = np.nonzero((mass == 0) & (mass.sum(axis=-1, keepdims=True) > 0))
