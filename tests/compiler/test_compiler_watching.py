@@ -13,6 +13,7 @@ import compiler
 from anytime import AnytimeError, Machine, Status, WorkClock
 from anytime.files import checksum
 from compiler.adaptive import plan_for
+from compiler.loading import inspect
 
 MACHINE = Machine("m").with_rate("look", 0.01).with_rate("think", 0.01).with_rate("find", 0.01)
 
@@ -121,6 +122,7 @@ def test_with_a_cost_of_time_the_last_call_is_ended_too():
 def test_what_is_loaded_watches_the_same(schedule, tmp_path):
     schedule.save(tmp_path / "a.schedule")
     again = compiler.load(tmp_path / "a.schedule", modules=[look, think])
+    assert repr(inspect(tmp_path / "a.schedule").explain(SECONDS)) == repr(again.explain(SECONDS))
     assert again.policy.watched == schedule.policy.watched == {"look", "think"}
     for seconds in np.linspace(schedule.least, 0.2, 7):
         assert again.promise(seconds) == pytest.approx(schedule.promise(seconds), abs=1e-6)
