@@ -22,6 +22,16 @@ from monitor.robots.naoqi_stage import Stage
 from planners.nao import POSTURES
 
 
+_AT_ONCE = 60.0  # seconds that lock-step lives in one call: meanwhile nobody is answered
+
+
+def _numbers(call: str, *values: Any) -> None:
+    """Raises what the caller is told if one is no finite number: anybody may send anything."""
+    for value in values:
+        if not isinstance(value, float | int) or not math.isfinite(value):
+            raise RuntimeError(f"{call}: needs finite numbers, not {str(value)[:40]!r}")
+
+
 class Motion:
     """ALMotion: walking. Metres, radians, in the robot's frame."""
 
@@ -29,6 +39,7 @@ class Motion:
         self._stage = stage
 
     def moveTo(self, x: float, y: float, theta: float) -> Any:  # noqa: N802
+        _numbers("ALMotion::moveTo", x, y, theta)
         return self._stage.command("walk", lambda body: body.walk(x, y, theta))
 
     def stopMove(self) -> None:  # noqa: N802
@@ -143,6 +154,7 @@ class SimClock:
         """Lock-step: let the scene start anew at a time, of that seed if it is one."""
         if self._stage.rate is not None:
             raise RuntimeError("SimClock.begin: only a server with --lockstep can begin anew")
+        _numbers("SimClock.begin", start, *(() if seed is None else (seed,)))
         self._stage.begin(start, seed)
         self._stage.begun = True
 
@@ -154,6 +166,9 @@ class SimClock:
         """Lock-step: live up to a time, after so many commands; time and number of what runs."""
         if self._stage.rate is not None:
             raise RuntimeError("SimClock.settle: only a server with --lockstep is told the time")
+        _numbers("SimClock.settle", now, commands)
+        if now - self._stage.clock.now() > _AT_ONCE:
+            raise RuntimeError(f"SimClock.settle: at most {_AT_ONCE:g} s at once")
         return list(self._stage.settle(now, commands))
 
     def truth(self) -> list[float]:

@@ -7,10 +7,12 @@ import contextlib
 import math
 import queue
 import signal
+import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -226,6 +228,73 @@ def test_who_thinks_too_long_finds_the_robot_standing_and_walks_on(rig):
 @pytest.mark.parametrize("name", FAILURES)
 def test_what_goes_wrong_ends_as_it_should(rig, name):
     assert FAILURES[name](rig)
+
+
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="who listens is told by Linux")
+def test_the_server_listens_on_loopback_alone(rig):
+    port = f":{rig.live().port:04X}"
+    tables = [Path(f"/proc/net/{name}") for name in ("tcp", "tcp6")]
+    lines = [line.split() for table in tables if table.exists() for line in table.open()]
+    listens = [line[1] for line in lines if line[3] == "0A" and line[1].endswith(port)]
+    assert listens == [f"0100007F{port}"]
+
+
+ILL_TYPED = [
+    ("ALMotion", "moveTo", ("far", {}, [])),
+    ("ALMotion", "moveTo", (math.nan, 0.0, 0.0)),
+    ("ALMotion", "moveTo", (0.0, math.inf, 0.0)),
+    ("ALMotion", "moveTo", (None, None, None)),
+    ("ALMotion", "moveTo", (1e9, 0.0, 0.0)),
+    ("ALMotion", "moveTo", (1.0, 2.0)),
+    ("ALMotion", "fly", (1.0,)),
+    ("ALRobotPosture", "goToPosture", (["Sit"], {})),
+    ("ALRobotPosture", "goToPosture", ("Fly", 1.0)),
+    ("SimClock", "begin", ("a", None)),
+    ("SimClock", "begin", (math.nan, None)),
+    ("SimClock", "settle", ({}, "a")),
+    ("SimClock", "settle", (1e300, 0)),
+]
+
+
+def test_calls_that_make_no_sense_move_nothing_and_disturb_nobody(rig):
+    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as nao:
+        before = nao.read()
+        for service, method, arguments in ILL_TYPED:
+            try:
+                answer = nao.link.call(service, method, *arguments)
+            except AnytimeError as error:
+                assert str(Path(__file__).parents[2]) not in str(error), "no paths of ours"
+                assert "Traceback" not in str(error)
+            else:
+                assert answer is False, (method, arguments)
+        assert nao.read() == before
+        nao.wait(1.0)
+        assert nao.read().pose_in_world == before.pose_in_world
+
+
+def test_connections_that_speak_nonsense_harm_nobody(rig):
+    magic = bytes.fromhex("42dead42")
+    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as nao:
+        before, port, held = nao.read(), rig.crowded().port, []
+        for number in range(120):
+            nonsense = [
+                np.random.default_rng(number).bytes(100),
+                magic + number.to_bytes(4, "little") + b"\xff" * 40,  # 4 GiB are announced
+                magic[:3],  # and the rest never comes
+                b"",
+            ][number % 4]
+            connection = socket.create_connection(("127.0.0.1", port))
+            with contextlib.suppress(OSError):  # it may hang up before all is said
+                connection.sendall(nonsense)
+            if number % 4 == 2:
+                held.append(connection)
+            else:
+                connection.close()
+        assert nao.read() == before
+        with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as other:
+            assert ended(other, other.walk(0.1, 0.0, 0.0)) is Outcome.DONE
+        for connection in held:
+            connection.close()
 
 
 def test_a_server_ends_on_ctrl_c(rig):
