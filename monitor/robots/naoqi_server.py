@@ -21,7 +21,6 @@ from monitor.robots.naoqi_names import NO_ECHO, SONARS
 from monitor.robots.naoqi_stage import Stage
 from planners.nao import POSTURES
 
-
 _AT_ONCE = 60.0  # seconds that lock-step lives in one call: meanwhile nobody is answered
 
 
@@ -178,6 +177,27 @@ class SimClock:
             return [*robot.true_pose_in_world, float(robot.falls), float(robot.world.contacts)]
 
 
+class Watching:
+    """The service that a robot needs for a halt within a second: see `naoqi_watch.Watch`."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def beat(self, echo: float) -> float:
+        _numbers("Watch.beat", echo)
+        with self._stage.lock:
+            return self._stage.watch.beat(echo)
+
+    def leave(self, echo: float) -> None:
+        _numbers("Watch.leave", echo)
+        with self._stage.lock:
+            self._stage.watch.leave(echo)
+
+    def heard(self) -> float:
+        """When somebody was last surely alive, on the server's `time.perf_counter`."""
+        return self._stage.watch.heard
+
+
 def serve(
     scene: Scene,
     *,
@@ -202,7 +222,10 @@ def serve(
             f"nobody can be served at port {port} of 127.0.0.1; give one that is free, or 0"
         ) from None
     kinds = {"ALMotion": Motion, "ALRobotPosture": Postures, "ALMemory": Memory}
-    for name, kind in (kinds | {"ALSonar": Listening, "SimClock": SimClock}).items():
+    kinds |= {"ALSonar": Listening, "SimClock": SimClock}
+    if rate is not None:  # in lock-step nothing moves when nobody is heard
+        kinds["Watch"] = Watching
+    for name, kind in kinds.items():
         session.registerService(name, kind(stage))
     try:
         ready(session.endpoints()[0])
