@@ -191,7 +191,8 @@ class Watching:
     def leave(self, echo: float) -> None:
         _numbers("Watch.leave", echo)
         with self._stage.lock:
-            self._stage.watch.leave(echo)
+            if not self._stage.running():  # who lost the link believes that all is over
+                self._stage.watch.leave(echo)
 
     def heard(self) -> float:
         """When somebody was last surely alive, on the server's `time.perf_counter`."""

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from anytime import AnytimeError, WallClock, WorkClock
 from anytime.machines import Machine
-from experiments.benchmarks import nao_failures
+from experiments.benchmarks import link_faults, nao_failures
 from experiments.benchmarks.nao_failures import COLLIDING, FAILURES, FREE, Rig, identical, observed
 from monitor.robots import naoqi_link
 from monitor.robots.nao_addresses import nao_body
@@ -34,7 +34,8 @@ from monitor.robots.naoqi import NaoqiBody
 from monitor.robots.naoqi_actions import Way
 from monitor.robots.naoqi_link import AuthenticatorFactory, password
 from monitor.robots.naoqi_names import FALLEN, NO_ECHO, SONARS
-from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock
+from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock, Watching
+from monitor.robots.naoqi_watch import LIMIT, Watch
 from monitor.robots.simulated_nao import SimulatedNao
 
 STANDS = Scene(posture="Stand", noise=NOISELESS)
@@ -359,6 +360,56 @@ def test_what_is_left_of_a_walk_is_all_of_it_at_its_start_and_nothing_at_its_end
         assert way.rest(end) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
 
 
+# The watch
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 0.4), st.floats(0.0, 2.0), st.floats(0.0, 2.0)), max_size=30),
+    st.floats(0.0, 3.0),
+)
+def test_a_robot_that_may_walk_has_heard_of_somebody_who_lived_within_the_limit(beats, later):
+    """Each beat is sent so long after the answer, and beat and answer take so long on their way."""
+    now = sent = 1.0
+    watch = Watch(lambda: now)
+    echo = 0.0
+    for pause, there, back in beats:
+        sent = now + pause
+        now = sent + there
+        echo = watch.beat(echo)
+        assert watch.silent or math.isnan(watch.heard) or now - sent <= LIMIT
+        now += back
+    now += later
+    assert watch.silent or math.isnan(watch.heard) or now - sent <= LIMIT
+
+
+def test_who_takes_leave_is_waited_for_no_more_and_who_overtook_it_is():
+    now = 1.0
+    watch = Watch(lambda: now)
+    first = watch.beat(0.0)
+    now = 1.1
+    second = watch.beat(first)
+    watch.leave(first)
+    assert math.isnan(watch.heard)
+    watch.beat(first)
+    assert math.isnan(watch.heard), "a beat that was on its way"
+    now = 1.2
+    watch.beat(second)
+    watch.leave(first)
+    assert watch.heard == second, "a leave that was on its way"
+    now = 9.0
+    assert watch.silent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", range(len(link_faults.KINDS)))
+def test_whatever_happens_to_the_link_the_robot_stands_within_a_second(rig, kind):
+    with contextlib.closing(link_faults.Lane(rig.floor)) as lane:
+        seen = link_faults.trial(lane, kind, 0)
+    assert seen.moved
+    assert seen.halt <= 1.0
+    assert seen.after == seen.unwatched == 0
+
+
 # Faults
 
 
@@ -499,7 +550,7 @@ def test_what_is_no_recording_is_refused_and_a_torn_end_is_not(tmp_path):
 
 def test_the_page_lists_what_is_served_and_what_can_go_wrong():
     page = (Path(__file__).parents[2] / "docs" / "nao.md").read_text(encoding="utf-8")
-    for service in (Motion, Postures, Memory, Listening, SimClock):
+    for service in (Motion, Postures, Memory, Listening, SimClock, Watching):
         for method in vars(service):
             assert method.startswith("_") or f"`{method}(" in page, method
     assert all(f"`{kind}`" in page for kind in KINDS)
