@@ -271,7 +271,7 @@ class NaoqiBody:
         action, self._action, self._probe = self._action, None, None
         if action is not None:
             action.outcome = outcome
-            self._heart.rest()
+            self._heart.rest(leave=outcome is not Outcome.LINK_LOST)
 
     def _ready(self) -> Look:
         """What a command is decided by. Raises LinkLostError."""

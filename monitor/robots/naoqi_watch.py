@@ -80,11 +80,14 @@ class Heart:
             self._thread = threading.Thread(target=self._run, daemon=True)
             self._thread.start()
 
-    def rest(self) -> None:
-        """Nothing is in execution any more."""
+    def rest(self, *, leave: bool = True) -> None:
+        """Nothing is in execution any more; leave: that is known of the robot, too.
+
+        Who lost the link must not take leave: a command may be on its way, and overtaken by that.
+        """
         with self._lock, contextlib.suppress(RuntimeError):  # libqi's, of a link that is lost
             service, self._service = self._service, None
-            if service is not None:
+            if service is not None and leave:
                 service.leave(self._echo, _async=True)
 
     def close(self) -> None:
