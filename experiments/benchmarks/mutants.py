@@ -32,7 +32,6 @@ _OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
 }
 _NAMES = {"min": "max", "minimum": "maximum", "argmin": "argmax", "any": "all", "floor": "ceil"}
 _NAMES |= {other: name for name, other in _NAMES.items()}
-_NAMES |= {"amin": "amax", "left": "right"}
 
 Change = tuple[str, Callable[[], None], Callable[[], None]]
 """What is changed, in words; do it; undo it."""

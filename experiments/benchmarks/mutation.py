@@ -127,6 +127,7 @@ def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...]) -> 
         sys.meta_path.insert(0, _Changed(name, code))
     files = [str(ROOT / "tests" / each) for each in tests]
     options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", f"--rootdir={ROOT}"]
+    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # loaded before the fork
     return int(pytest.main([*options, *files]))
 
 

@@ -63,7 +63,8 @@ def slope(times: np.ndarray, values: np.ndarray) -> tuple[float, float, float]:
         for series in (times, values)
     )
     fit = linregress(x, y)
-    wide = float(student.ppf(0.975, blocks - 2)) * float(fit.stderr)
+    stray = float(np.nan_to_num(fit.stderr))  # NaN where nothing changes at all
+    wide = float(student.ppf(0.975, blocks - 2)) * stray
     return float(fit.slope), float(fit.slope) - wide, float(fit.slope) + wide
 
 
