@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from monitor import Decision, Energy, Mission, Situation, State, Value
 from monitor.calibration import spread_of
-from monitor.inter_frame import Contracts, Spread, best_contract, foresee
+from monitor.inter_frame import (
+    Contracts,
+    Spread,
+    best_contract,
+    compiled_contracts,
+    foresee,
+)
 from monitor.intra_frame import keep_course
 from monitor.policies import Expected, Informed, Paper, constant
 from monitor.rhythms import Lived, Rhythm, rhythm_of
@@ -60,6 +66,44 @@ def test_the_decision_is_the_best_of_all_contracts_and_speeds():
     assert decision.why.net == pytest.approx(max(net for _, net in decision.why.curve))
 
 
+@given(
+    st.sampled_from([0.0, 1.0, 30.0, 200.0]),
+    st.floats(0.0, 30.0),
+    st.sampled_from([0, 1, 2]),
+    st.floats(1.0, 9.0),
+)
+def test_what_is_foreseen_is_thinking_or_driving_whichever_is_longer_frame_by_frame(
+    to_go, in_hand, row, speed
+):
+    mission = replace(MISSION, job=3.0)
+    contracts = replace(CONTRACTS, efficiency=np.array([0.5, 0.8, 0.9]))
+    asked = state(to_go=to_go, in_hand=in_hand)
+    seconds, energy = foresee(mission, contracts, RHYTHM, asked, np.array([speed]))
+    sensing, contract = contracts.shares[row, 0], contracts.shares[row].sum()
+    often, far, stops = (float(each[0]) for each in RHYTHM.at(np.array([sensing])))
+    frames, drive = often * to_go, far / contracts.efficiency[row] / speed
+    walk = RHYTHM.stretched(in_hand, asked.made_on) / speed
+    lasts = max(contract, walk) if to_go > 0 else walk  # the first plan is made meanwhile
+    if frames > 1:
+        lasts += (frames - 1) * max(contract, drive)  # the next plan is made meanwhile
+    lasts += min(frames, 1.0) * drive  # after the last there is none to make
+    lasts += frames * stops * contract + mission.job
+    moves = walk + frames * drive
+    assert seconds[row, 0] == pytest.approx(lasts)
+    idle = mission.energy.idle * (lasts - moves)
+    assert energy[row, 0] == pytest.approx(moves * mission.energy.power(speed) + idle)
+
+
+def test_what_a_contract_makes_of_its_plans_is_a_share_that_more_time_never_lessens():
+    from experiments import crossings
+
+    contracts = compiled_contracts(crossings.compiled())
+    assert ((contracts.efficiency >= 0.05) & (contracts.efficiency <= 1.0)).all()
+    assert contracts.efficiency[0] < 0.9
+    assert contracts.efficiency[-1] == contracts.efficiency.max()
+    assert (contracts.probes >= contracts.efficiency[:, None] - 0.05).all()
+
+
 def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
     slow = replace(MISSION, speeds=(1.0, 1.0))
     prices = best_contract(slow, CONTRACTS, RHYTHM, Spread(), state()).why.prices
@@ -93,6 +137,20 @@ def test_the_four_cases_of_the_paper(seen, in_hand, case):
     decided = keep_course(MISSION, now)
     assert decided.why.case == case
     assert np.sign(decided.speed - 4.0) == {"faster": 1, "slower": -1, "keep course": 0}[case]
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.1, 1.0))
+def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation):
+    mission = replace(MISSION, gain=gain, speeds=(0.1, 100.0))
+    contract = Decision({"see": 2.0, "plan": 2.0}, 4.0)  # ends at 4 s; 2 s are gone
+
+    def decided(late, seen):
+        ends = state(2.0, in_hand=4.0 * (2.0 + 4.0 * late), moment="call", contract=contract)
+        return keep_course(mission, replace(ends, advertised=0.5, seen=seen)).speed
+
+    assert decided(deviation, 0.9) == pytest.approx(4.0 * (1 + gain * deviation))
+    early = deviation / 2  # nobody can be more than the 2 s ahead that are left
+    assert decided(-early, 0.1) == pytest.approx(4.0 * (1 - gain * early))
 
 
 def test_the_gain_is_a_parameter_of_the_mission():
