@@ -139,18 +139,34 @@ def test_the_four_cases_of_the_paper(seen, in_hand, case):
     assert np.sign(decided.speed - 4.0) == {"faster": 1, "slower": -1, "keep course": 0}[case]
 
 
-@given(st.floats(0.1, 1.0), st.floats(0.1, 1.0))
-def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation):
+def on_course(contract=4.0, late=0.0, **seen):
+    """Half of a contract has gone; execution ends late by this share of it."""
+    decision = Decision({"see": contract / 2, "plan": contract / 2}, 4.0)
+    in_hand = 4.0 * (contract / 2 + contract * late)
+    return state(contract / 2, in_hand=in_hand, moment="call", contract=decision, **seen)
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.1, 1.0), st.sampled_from([0.25, 1.0, 4.0]))
+def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation, contract):
     mission = replace(MISSION, gain=gain, speeds=(0.1, 100.0))
-    contract = Decision({"see": 2.0, "plan": 2.0}, 4.0)  # ends at 4 s; 2 s are gone
+    behind = on_course(contract, deviation, advertised=0.5, seen=0.9)
+    assert keep_course(mission, behind).speed == pytest.approx(4.0 * (1 + gain * deviation))
+    early = deviation / 2  # nobody can be ahead by more than the half that is left
+    ahead = on_course(contract, -early, advertised=0.5, seen=0.1)
+    assert keep_course(mission, ahead).speed == pytest.approx(4.0 * (1 - gain * early))
 
-    def decided(late, seen):
-        ends = state(2.0, in_hand=4.0 * (2.0 + 4.0 * late), moment="call", contract=contract)
-        return keep_course(mission, replace(ends, advertised=0.5, seen=seen)).speed
 
-    assert decided(deviation, 0.9) == pytest.approx(4.0 * (1 + gain * deviation))
-    early = deviation / 2  # nobody can be more than the 2 s ahead that are left
-    assert decided(-early, 0.1) == pytest.approx(4.0 * (1 - gain * early))
+def test_who_is_neither_ahead_nor_behind_keeps_course():
+    for seen in (0.1, 0.5, 0.9):
+        assert keep_course(MISSION, on_course(advertised=0.5, seen=seen)).why.case == "keep course"
+    as_advertised = on_course(late=0.5, advertised=0.5, seen=0.5)
+    assert keep_course(MISSION, as_advertised).why.case == "faster"
+
+
+@pytest.mark.parametrize("seen", [{"advertised": 0.5}, {"seen": 0.9}, {}])
+def test_where_nothing_was_advertised_or_seen_the_contract_stands(seen):
+    asked = on_course(late=1.0, **seen)
+    assert keep_course(MISSION, asked) is asked.contract
 
 
 def test_the_gain_is_a_parameter_of_the_mission():
