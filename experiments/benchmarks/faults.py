@@ -218,6 +218,7 @@ def _soak(seconds: float, seed: int, settings: dict[str, Any]) -> dict[str, floa
     found = soak.soaked(seconds, seed)
     settled = found.settled()
     mean, low, high = found.mb_per_hour()
+    files, children = found.grown()
     settings["soak.seconds"] = seconds
     return {
         "soak.missions": found.missions,
@@ -226,8 +227,8 @@ def _soak(seconds: float, seed: int, settings: dict[str, Any]) -> dict[str, floa
         "soak.mb_per_hour_high": high,
         "soak.mb": float(settled[-1, 1]),
         "soak.mb_grown": float(settled[-1, 1] - settled[0, 1]),
-        "soak.file_descriptors_grown": int(settled[-1, 2] - settled[0, 2]),
-        "soak.children_grown": int(settled[-1, 3] - settled[0, 3]),
+        "soak.file_descriptors_grown": files,
+        "soak.children_grown": children,
         "soak.exceptions": found.raised,
     }
 

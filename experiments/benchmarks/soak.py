@@ -1,6 +1,7 @@
 """Mission after mission in one process, for minutes or hours: what of its memory is not given back.
 
-Faulty missions with their logs, written and read, and isolated modules that misbehave.
+Faulty missions with their logs, written and read, and isolated modules that misbehave. The same
+missions come again and again: the warm-up has seen the largest, so what still grows is kept.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from monitor.log_reading import read_log
 from monitor.logs import Floor, write_log
 
 WARM = 1 / 3  # of the time, after which memory should stay as it is
+ROUND = 100  # missions, after which they come again
 _BLOCKS = 24  # of the time after that; neighbouring samples hang together, blocks hardly
 _EVERY = 20  # missions between two runs of an isolated module
 _CONTRACT = 0.02  # seconds of that
@@ -48,6 +50,13 @@ class Soaked:
         """The rows after the warm-up [samples, 4]."""
         rows = np.array(self.rows)
         return rows[rows[:, 0] >= WARM * rows[-1, 0]]
+
+    def grown(self) -> tuple[int, int]:
+        """File descriptors and children: how many more at most in the second half than in the
+        first. A spare worker that is just being started comes and goes."""
+        first, second = np.array_split(self.settled(), 2)
+        more = second[:, 2:].max(axis=0) - first[:, 2:].max(axis=0)
+        return int(more[0]), int(more[1])
 
     def mb_per_hour(self) -> tuple[float, float, float]:
         """Slope of memory after the warm-up, with its 95 % interval: least squares over blocks."""
@@ -83,7 +92,7 @@ def soak(program: CompiledProgram, seconds: float, seed: int) -> Soaked:
     misbehaving = list(MISBEHAVING.values())
     with TemporaryDirectory() as folder:
         while (now := time.perf_counter() - began) < seconds or number < 3:
-            drawn = faulty_missions.drawn(program, number, seed)
+            drawn = faulty_missions.drawn(program, number % ROUND, seed)
             raised += bool(_lived(program, drawn, Path(folder) / "log.jsonl"))
             if number % _EVERY == 0:
                 module = misbehaving[number // _EVERY % len(misbehaving)]

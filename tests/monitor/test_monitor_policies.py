@@ -15,6 +15,7 @@ from monitor.inter_frame import (
     best_contract,
     compiled_contracts,
     foresee,
+    pinned_contracts,
 )
 from monitor.intra_frame import keep_course
 from monitor.policies import Expected, Informed, Paper, constant
@@ -75,7 +76,7 @@ def test_the_decision_is_the_best_of_all_contracts_and_speeds():
 def test_what_is_foreseen_is_thinking_or_driving_whichever_is_longer_frame_by_frame(
     to_go, in_hand, row, speed
 ):
-    mission = replace(MISSION, job=3.0)
+    mission = replace(MISSION, job=3.0, energy=replace(MISSION.energy, idle=0.05))
     contracts = replace(CONTRACTS, efficiency=np.array([0.5, 0.8, 0.9]))
     asked = state(to_go=to_go, in_hand=in_hand)
     seconds, energy = foresee(mission, contracts, RHYTHM, asked, np.array([speed]))
@@ -102,6 +103,21 @@ def test_what_a_contract_makes_of_its_plans_is_a_share_that_more_time_never_less
     assert contracts.efficiency[0] < 0.9
     assert contracts.efficiency[-1] == contracts.efficiency.max()
     assert (contracts.probes >= contracts.efficiency[:, None] - 0.05).all()
+
+
+def test_pinned_contracts_sense_as_little_or_as_long_as_is_of_use_and_plan_as_they_like():
+    from experiments import crossings
+
+    program = crossings.compiled()
+    least, most = (pinned_contracts(program, extreme) for extreme in ("min", "max"))
+    assert set(least.shares[:, 0]) == {program.tables[0].first}
+    assert set(most.shares[:, 0]) == {program.tables[0].saturation}
+    for contracts in (least, most):
+        planning = contracts.shares[:, 1]
+        assert (np.diff(planning) > 0).all()
+        assert planning[0] > 0
+        assert planning[-1] <= program.tables[1].times[-1]
+        assert len(planning) > 5
 
 
 def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
