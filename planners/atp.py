@@ -3,10 +3,10 @@
 The paper's planner (`planners.paper_atp`) searches abstractly by obstacleness and refines segments
 between points that it has pinned; it fails where there are walls. This one keeps the outline, first
 coarse, then ever finer where it is worst. Where obstacles are walls, the coarse way leads over the
-graph of regions, whose connectivity is exact; where they are independent of each other, a weight
-that suits their density lets a search run straight through. The way in hand is then made shorter in
-windows along it or in a corridor around it, and at last by a search that proves it optimal and
-makes it shorter on the way there.
+graph of regions, whose connectivity is exact; where they are independent of each other, a heuristic
+that expects what ways cost at their density lets a search run straight through. The way in hand is
+then made shorter, in windows along it or by searches that expect ever less, and at last by one that
+proves it optimal and makes it shorter on the way there.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 import anytime
 from planners import blocks, improving, tracing
-from planners.frontier import cells_of
+from planners.frontier import cells_of, least_way
 from planners.grids import Grid, endpoints
-from planners.improving import COUNT, GAIN, LOWEST, MEETING, UPPER, Run
+from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
+from planners.norms import expected_norm, least_norm
 from planners.path_finding import Cell
 from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
@@ -31,11 +32,13 @@ GRAIN = 500
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
-_PERCOLATION = 0.407  # density of independent obstacles at which floors fall apart
-_REGION_PERCENT = 110  # weight of the search over regions
-_CORRIDOR_PERCENT = 103
+_REGION_PERCENT = 104  # weight of the search over regions between ends 128 cells apart …
+_PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
+_FIRST, _SCALES = 1.08, (1.015, 0.995)
+"""By what the norm of independent obstacles is multiplied, search by search …"""
+_TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
-_WINDOW_SHARE = 3  # … which together take at most so many times the work of the coarse way
+_WINDOW_SHARE = 4  # … which together take at most so many times the work of the coarse way
 _PATIENCE = 12  # expansions per cell of distance after which a weight was too small
 
 
@@ -64,7 +67,8 @@ def steps(
         for work in query.phases():
             plan = None
             if query.cost < best or (query.done and not proven and best < math.inf):
-                best, proven, plan = query.cost, query.done, query.plan()
+                plan, proven = query.plan(), query.done
+                best = query.cost
             yield Step(work, plan)
         if math.isinf(best):
             yield Step(0.0, NO_WAY)
@@ -94,8 +98,7 @@ class _Query:
         columns = grid.shape[1]
         self.down = goal // columns - start // columns
         self.across = goal % columns - start % columns
-        self.straight = int(improving.least_way(self.down, self.across, diagonals))
-        self.least = self.straight
+        self.least: float = int(least_way(self.down, self.across, diagonals))
         self.cost: float = math.inf
         self.coarse = 0.0
         run.state[COUNT], run.state[MEETING] = 0, -1
@@ -105,20 +108,22 @@ class _Query:
         """Work step by step; see `steps`."""
         far = max(abs(self.down), abs(self.across))
         if far <= _SMALL:
-            yield from self.search(100, budget=_SMALL_BUDGET)
+            yield from self.search(budget=_SMALL_BUDGET)
             if self.done:
                 return
-        density, clustering, looked = self.grid.features
+        _, clustering, looked = self.grid.features
         yield looked / blocks.EXPANDED
         if clustering < _CLUSTERED:
-            yield from self.run_through(density, far)
+            yield from self.search(_FIRST, patience=_PATIENCE * far)
+            for scale in _SCALES:
+                if not self.done:
+                    yield from self.search(scale)
             if self.done:
                 return
-            yield from self.search(_CORRIDOR_PERCENT, radius=1)
         else:
             yield from self.over_regions()
             if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
-                yield from self.run_through(density, far)
+                yield from self.search(_FIRST, patience=_PATIENCE * far)
             if self.done:
                 return
             left = _WINDOW_SHARE * self.coarse
@@ -130,7 +135,7 @@ class _Query:
                         break
                 if left < 0:
                     break
-        yield from self.search(100)
+        yield from self.search()
 
     @property
     def done(self) -> bool:
@@ -138,80 +143,69 @@ class _Query:
         return self.cost <= self.least or math.isinf(self.least)
 
     def search(
-        self, percent: int, *, radius: int | None = None, budget: int = UNLIMITED
+        self, scale: float | None = None, *, budget: int = UNLIMITED, patience: int = UNLIMITED
     ) -> Iterator[float]:
-        """Search for a better way, in a corridor of that many blocks on each side if any."""
-        run, state = self.run, self.run.state
+        """Search for a better way: for the best, or by `scale` times the norm of the density.
+
+        Where such a search gets stuck, for so many expansions, its norm was too small.
+        """
+        run, state, exact = self.run, self.run.state, scale is None
         known = not math.isinf(self.cost)
-        improving.begin(self.start, percent, int(self.cost) if known else SPAN, run)
+        if scale is not None and known:
+            run.norm[:] = self._norm(1.0)
+            expected = int(improving.estimated(self.down, self.across, run.norm))
+            scale = max(scale, _TRUSTED * self.cost / expected)
+        run.norm[:] = self._norm(scale)
+        improving.begin(
+            self.grid.cost, self.grid.shape[1], self.start, self.goal,
+            int(self.cost) if known else SPAN, exact, run,
+        )  # fmt: skip
         if known:
             improving.follow_way(*self._map, run)
         else:
             state[COUNT] = 0
-        if radius is not None:
-            touched = improving.confine(self.grid.shape[0], self.grid.shape[1], radius, run)
-            yield touched * blocks.TOUCHED / blocks.EXPANDED
-        spent, found = 0, OUT_OF_BUDGET
-        while found == OUT_OF_BUDGET and spent < budget:
+        spent, done, left = 0, OUT_OF_BUDGET, patience
+        while done == OUT_OF_BUDGET and spent < budget:
             most = min(GRAIN, budget - spent)
-            found, taken = improving.search(
-                *self._map, self.start, self.goal, self.diagonals, 1, run, most
-            )
+            done, taken = improving.search(*self._map, self.goal, self.diagonals, run, most)
             spent += taken
-            if found == OUT_OF_BUDGET:
-                if known:
+            left -= taken
+            if done == OUT_OF_BUDGET:
+                if state[MEETING] >= 0:
                     self.cost = int(state[UPPER] - state[GAIN])
-                if percent == 100 and radius is None:
-                    self.least = max(self.least, int(state[LOWEST]))
+                if exact:
+                    self.least = max(self.least, int(state[CURRENT]) << int(state[SHIFT]))
+                elif scale is not None and left < 0:
+                    scale, left = 1.25 * scale, patience
+                    run.norm[:] = self._norm(scale)
+                    improving.reweigh(self.grid.shape[1], self.goal, run)
                 yield float(taken)
-        if found == OUT_OF_BUDGET:
+        if done == OUT_OF_BUDGET:
             return
-        node = self.goal if found == improving.FOUND else int(state[MEETING])
-        if node >= 0:
-            self.cost = int(improving.take_up(*self._map, self.start, node, self.diagonals, run))
-        state[MEETING] = -1
-        if percent == 100 and radius is None:
+        if state[MEETING] >= 0:
+            self.cost = int(improving.take_up(*self._map, self.start, self.diagonals, run))
+        if exact or math.isinf(self.cost):
             self.least = self.cost
         yield float(taken)
 
-    def run_through(self, density: float, far: int) -> Iterator[float]:
-        """A first way by a weight at which a search runs straight through independent obstacles."""
-        percent = _running_percent(density)
-        run, spent, patience = self.run, 0, _PATIENCE * far
-        improving.begin(self.start, percent, SPAN, run)
-        run.state[COUNT] = 0
-        while True:
-            found, taken = improving.search(
-                *self._map, self.start, self.goal, self.diagonals, 1, run, GRAIN
-            )
-            spent += taken
-            if found != OUT_OF_BUDGET:
-                break
-            yield float(taken)
-            if spent > patience:
-                percent, spent = min(percent + percent // 4, 1000), 0
-                improving.reweigh(self.grid.shape[1], self.goal, self.diagonals, 1, percent, run)
-        if found == NO_PATH:
-            self.least = math.inf
-        else:
-            self.cost = int(
-                improving.take_up(*self._map, self.start, self.goal, self.diagonals, run)
-            )
-            if percent == 100:
-                self.least = self.cost
-        yield float(taken)
+    def _norm(self, scale: float | None) -> list[int]:
+        if scale is None:
+            return least_norm(self.diagonals)
+        return expected_norm(self.grid.features[0], scale, self.diagonals)
 
     def over_regions(self) -> Iterator[float]:
         """A first way over the graph of regions."""
         grid, run = self.grid, _borrow_regions(self.grid.shape)
         cost, wall, columns = self._map
         soft = (cost, wall, grid.dearest, columns)
+        far = max(abs(self.down), abs(self.across))
+        percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         try:
-            work = blocks.begin_regions(*soft, self.start, self.goal, grid.regions, run)
+            work = blocks.begin_regions(*soft, self.start, self.goal, percent, grid.regions, run)
             found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
                 found, taken = blocks.search_regions(
-                    *soft, self.goal, self.diagonals, _REGION_PERCENT, grid.regions, run,
+                    *soft, self.goal, self.diagonals, percent, grid.regions, run,
                     GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
                 work += taken
@@ -238,9 +232,10 @@ class _Query:
         """Make the way optimal in windows of that many cells, one after the other."""
         state, done = self.run.state, False
         state[improving.POSITION] = 0
+        self.run.norm[:] = self._norm(None)
         while not done:
             done, taken = improving.improve_windows(
-                *self._map, length, self.diagonals, 1, self.run, GRAIN
+                *self._map, length, self.diagonals, self.run, GRAIN
             )
             state[MEETING] = -1
             self._weigh()
@@ -253,6 +248,8 @@ class _Query:
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
         way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
+        # Labels that were corrected since may have made it even shorter than was told.
+        self.cost = int(improving.way_cost(*self._map, way, 0, len(way) - 1))
         return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
 
 
@@ -262,16 +259,6 @@ _region_runs: dict[tuple[int, int], list[blocks.RegionRun]] = {}
 def _borrow_regions(shape: tuple[int, int]) -> blocks.RegionRun:
     kept = _region_runs.setdefault(shape, [])
     return kept.pop() if kept else blocks.new_region_run(*shape)
-
-
-def _running_percent(density: float) -> int:
-    """The weight for independent obstacles of a density.
-
-    From some weight on, a search among them costs a constant for every cell of distance, and below
-    it ever more: fitted to floors of 10 to 35 %, 1 + p / (1 - (p/.407)^5).
-    """
-    p = min(density, 0.95 * _PERCOLATION)
-    return round(100 * (1.0 + p / (1.0 - (p / _PERCOLATION) ** 5)))
 
 
 def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:

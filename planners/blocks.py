@@ -12,51 +12,70 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import least_way, next_base, pop, sift_up
-from planners.search import CLOSED, NO_PATH, OUT_OF_BUDGET, SPAN
+from planners.frontier import (
+    NOT_FIRST,
+    NOT_LAST,
+    ONE,
+    SIDE_BITS,
+    detour,
+    flood,
+    least_way,
+    next_base,
+)
+from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-FRONTIER = "84699215c6e2"
+FRONTIER = "e939f8aacbfe"
 
 FOUND = 0
 SIDE, MOST = 8, 32
 UNKNOWN = 255
+BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
+OPENED, LAST_REGION, SHIFT, CURRENT, LOW, HIGH, FRESH, UNUSED = range(8)
+"""State of a search over regions: entries in all buckets; the goal's region; width of a bucket, as
+a shift; the bucket at work, the lowest and the highest used; the first entry never used, the first
+given back."""
 STREAMED, TOUCHED, EXPANDED = 1, 16, 256
 """Work of a cell summed, a word or cell touched, a node expanded, in 1/256 of an expansion."""
 
-ONE, ZERO, SIDE_BITS = np.uint64(1), np.uint64(0), np.uint64(SIDE)
+ZERO, ALL = np.uint64(0), ~np.uint64(0)
 LAST_ROW = np.uint64(SIDE * (SIDE - 1))
 FIRST_ROW = np.uint64(0xFF)
 FIRST_COLUMN = np.uint64(0x0101010101010101)
 LAST_BIT = np.uint64(SIDE - 1)
-NOT_FIRST = ~FIRST_COLUMN
-NOT_LAST = ~(FIRST_COLUMN << LAST_BIT)
+GATHER = np.uint64(0x0102040810204080)
 
 
 class Regions(NamedTuple):
     """What is known of a map's blocks; bit 8·row + column of a word is a cell of its block.
 
-    word: passable cells. count: regions, or UNKNOWN. mask: the cells of region k of block b, at
-    32·b + k.
+    count: regions of each of the n blocks, or UNKNOWN. Region k of block b has the number k·n + b,
+    so that those which mostly are the only ones lie together. mask: its cells. edge: those in the
+    block's first row, last row, first column and last column, a byte each from the lowest on.
     """
 
-    word: NDArray[np.uint64]
     count: NDArray[np.uint8]
     mask: NDArray[np.uint64]
+    edge: NDArray[np.uint32]
 
 
 class RegionRun(NamedTuple):
-    """Arrays of a search over regions: label, heap, key and slot as in other searches.
+    """Arrays of a search over regions: buckets, their entries and labels as in `improving`.
 
-    pin: of each region, the cell where it is entered. parent: the region from which.
+    Of each region, pin: the cell where it is entered. parent: the region from which. door: the
+    cells that join the two, as bits along their border, and the side of the parent in the next
+    byte. bend: the cell at which the way to the pin bends last.
     """
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]
-    key: NDArray[np.int64]
-    heap: NDArray[np.int32]
-    slot: NDArray[np.int32]
+    bucket: NDArray[np.int32]
+    entry: NDArray[np.int32]
+    behind: NDArray[np.int32]
     pin: NDArray[np.int32]
     parent: NDArray[np.int32]
+    door: NDArray[np.int32]
+    bend: NDArray[np.int32]
+    cheapest: NDArray[np.int64]
     state: NDArray[np.int64]
 
 
@@ -64,9 +83,9 @@ def new_regions(rows: int, columns: int) -> Regions:
     """A map of which nothing is known yet."""
     blocks = -(-rows // SIDE) * -(-columns // SIDE)
     return Regions(
-        word=np.zeros(blocks, np.uint64),
         count=np.full(blocks, UNKNOWN, np.uint8),
-        mask=np.zeros(blocks * MOST, np.uint64),
+        mask=np.empty(blocks * MOST, np.uint64),  # not zeroed, which would take longer than a query
+        edge=np.empty(blocks * MOST, np.uint32),
     )
 
 
@@ -76,12 +95,16 @@ def new_region_run(rows: int, columns: int) -> RegionRun:
     return RegionRun(
         clock=np.zeros(1, np.int64),
         label=np.zeros(regions, np.int64),
-        key=np.zeros(regions, np.int64),
-        heap=np.zeros(regions, np.int32),
-        slot=np.zeros(regions, np.int32),
+        bucket=np.full(BUCKETS, NOTHING, np.int32),
+        # Two blocks share at most 8 cells of a border, so this many joins at most.
+        entry=np.zeros(regions + 1, np.int32),
+        behind=np.zeros(regions + 1, np.int32),
         pin=np.zeros(regions, np.int32),
         parent=np.zeros(regions, np.int32),
-        state=np.zeros(3, np.int64),
+        door=np.zeros(regions, np.int32),
+        bend=np.zeros(regions, np.int32),
+        cheapest=np.zeros(regions, np.int64),
+        state=np.zeros(8, np.int64),
     )
 
 
@@ -125,12 +148,24 @@ def _smear(fill, word):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _edges(mask):
+    """The outermost cells of a region, as `Regions.edge`. A product gathers a column's bits."""
+    west = ((mask & FIRST_COLUMN) * GATHER) >> LAST_ROW
+    east = (((mask >> LAST_BIT) & FIRST_COLUMN) * GATHER) >> LAST_ROW
+    return np.uint32(
+        (mask & FIRST_ROW)
+        | (mask >> LAST_ROW) << SIDE_BITS
+        | west << np.uint64(2 * SIDE)
+        | east << np.uint64(3 * SIDE)
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def know(cost, wall, dearest, columns, block, regions):
     """Part a block into regions if it is not known yet; return the work, in 1/256 expansions."""
     if regions.count[block] != UNKNOWN:
         return 0
     word = _pack(cost, wall, dearest, columns, block)
-    regions.word[block] = word
     work, count, left = SIDE * SIDE * STREAMED, 0, word
     while left != ZERO:
         fill, before = left & (~left + ONE), ZERO
@@ -138,7 +173,8 @@ def know(cost, wall, dearest, columns, block, regions):
             before = fill
             fill = _smear(fill, word)
             work += TOUCHED
-        regions.mask[block * MOST + count] = fill
+        region = count * regions.count.size + block
+        regions.mask[region], regions.edge[region] = fill, _edges(fill)
         left &= ~fill
         count += 1
     regions.count[block] = count
@@ -152,7 +188,8 @@ def region_of(columns, node, regions):
     row, column = node // columns, node % columns
     block = row // SIDE * across + column // SIDE
     bit = ONE << np.uint64(row % SIDE * SIDE + column % SIDE)
-    for region in range(block * MOST, block * MOST + np.int64(regions.count[block])):
+    for number in range(np.int64(regions.count[block])):
+        region = number * regions.count.size + block
         if regions.mask[region] & bit != ZERO:
             return region
     return -1
@@ -168,124 +205,219 @@ def forget(regions, columns, top, left, bottom, right):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin_regions(cost, wall, dearest, columns, start, goal, regions, run):
+def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, run):
     """Begin a search from start to goal; return the work, in 1/256 expansions."""
-    across = (columns + SIDE - 1) // SIDE
-    work = 0
+    rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
+    state, work = run.state, 0
     for node in (start, goal):
         block = node // columns // SIDE * across + node % columns // SIDE
         work += know(cost, wall, dearest, columns, block, regions)
     base = next_base(run)
+    for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
+        run.bucket[place & (BUCKETS - 1)] = NOTHING
     first, last = region_of(columns, start, regions), region_of(columns, goal, regions)
-    run.state[0], run.state[1], run.state[2] = 1, first, last
+    state[OPENED], state[LAST_REGION], state[LOW], state[HIGH] = 0, last, 0, -1
     if first < 0 or last < 0:
-        run.state[0] = 0
         return work
+    # All that is open at once must fit into the ring of buckets: f falls on the way to the goal by
+    # what the weight adds, and rises with one step by at most two blocks each way and back.
+    spread = (percent - 100) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
+    state[SHIFT] = FINE
+    while spread >> state[SHIFT] >= BUCKETS:
+        state[SHIFT] += 1
     run.label[first] = base
-    run.key[0] = 0
-    run.heap[0] = first
-    run.slot[first] = 0
     run.pin[first] = start
     run.parent[first] = -1
+    run.door[first] = 0
+    run.bend[first] = start
+    h = least_way(start // columns - goal // columns, start % columns - goal % columns, True)
+    state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
+    state[CURRENT] = state[LOW] = state[HIGH] = (h * percent // 100) >> state[SHIFT]
+    run.entry[0], run.behind[0] = first, NOTHING
+    run.bucket[state[CURRENT] & (BUCKETS - 1)] = 0
     return work
+
+
+def _nearest() -> NDArray[np.uint8]:
+    """By cells of a border (bits) and one of its eight places: the place of the nearest cell."""
+    table = np.zeros((1 << SIDE, SIDE), np.uint8)
+    for cells in range(1, 1 << SIDE):
+        places = [place for place in range(SIDE) if cells >> place & 1]
+        for wanted in range(SIDE):
+            table[cells, wanted] = min(places, key=lambda place: abs(place - wanted))
+    return table
+
+
+NEAREST = _nearest()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def crossing(ahead, along, goal_ahead, goal_along, line):
+    """Where the straight way from a place to a goal crosses a line `ahead`; if it does not, where a
+    diagonal towards the goal would."""
+    to_line, to_goal, aside = line - ahead, goal_ahead - ahead, goal_along - along
+    if to_line * to_goal > 0 and abs(to_line) <= abs(to_goal):
+        return along + int(np.floor(aside * to_line / to_goal + 0.5))
+    return along + min(max(aside, -abs(to_line)), abs(to_line))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _in_sight(cells, first, line, ahead, along, to_ahead, to_along):
+    """Whether the straight way between two places crosses a line `ahead` in one of the cells, bits
+    from `first` on."""
+    if (line - ahead) * (to_ahead - line) < 0 or to_ahead == ahead:
+        return False
+    place = crossing(ahead, along, to_ahead, to_along, line) - first
+    return 0 <= place < SIDE and (cells >> place) & 1 != 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regions, run, budget):
     """Go on with the search; return (FOUND or NO_PATH or OUT_OF_BUDGET, work in 1/256 expansions).
 
-    Weighted A*: a region's g is the least way over its pins, the cells where each region of the
-    way is entered, and of the cells that join two regions that one is the pin which is the least
-    detour from the pin before to the goal.
+    Weighted A*. A region is entered by one cell, its pin: of the cells that join it to the region
+    before, the one nearest to the straight way to the goal from where the way bends last. It bends
+    anew where what is straight from there does not lead through the door before.
     """
-    rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
-    high = (rows + SIDE - 1) // SIDE
-    label, key, heap, slot = run.label, run.key, run.heap, run.slot
-    base, size, last, work = run.clock[0], run.state[0], run.state[2], 0
+    across = (columns + SIDE - 1) // SIDE
+    tall, count = regions.count.size // across, regions.count.size
+    label, bucket, entry, behind, edge = run.label, run.bucket, run.entry, run.behind, regions.edge
+    pins, bends, doors, parents = run.pin, run.bend, run.door, run.parent
+    cheapest = run.cheapest
+    state, base, work, found = run.state, run.clock[0], 0, NO_PATH
+    shift, last, current, opened = state[SHIFT], state[LAST_REGION], state[CURRENT], state[OPENED]
+    low, high, fresh, unused = state[LOW], state[HIGH], state[FRESH], state[UNUSED]
     goal_row, goal_column = goal // columns, goal % columns
-    while size > 0:
+    per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
+    waves = np.empty(SIDE * SIDE + 1, np.uint64)
+    while opened > 0:
         if work >= budget:
-            run.state[0] = size
-            return OUT_OF_BUDGET, work
-        here = pop(size, heap, slot, key, label)
-        size -= 1
+            found = OUT_OF_BUDGET
+            break
+        place = np.int64(bucket[current & (BUCKETS - 1)])
+        if place < 0:
+            current += 1
+            continue
+        bucket[current & (BUCKETS - 1)] = behind[place]
+        behind[place], unused = unused, place
+        opened -= 1
+        here = np.int64(entry[place])
+        if label[here] & 1:  # closed
+            continue
         work += EXPANDED
+        pin_g = base - label[here]
+        label[here] -= 1
         if here == last:
-            run.state[0] = size
-            return FOUND, work
-        block, mask = here // MOST, regions.mask[here]
-        top, left = block // across * SIDE, block % across * SIDE
-        pin = np.int64(run.pin[here])
-        pin_row, pin_column = pin // columns, pin % columns
-        g = base - label[here]
+            found = FOUND
+            break
+        # Divisions of integers would take most of the time.
+        block = here - int((here + 0.5) * per_block) * count
+        block_row = int((block + 0.5) * per_across)
+        block_column = block - block_row * across
+        top, left = block_row * SIDE, block_column * SIDE
+        pin, bend = np.int64(pins[here]), np.int64(bends[here])
+        pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
+        pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
+        door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
+        bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
+        inside, reached, mask = np.int64(0), np.int64(0), regions.mask[here]
+        if mask != ALL:  # what stands in the block may be in the way
+            inside = (pin_row - top) * SIDE + pin_column - left
+            reached = flood(mask, inside, diagonals, waves)
+            work += reached * TOUCHED
         for side in range(4):
-            work += TOUCHED
+            mine = (np.int64(edge[here]) >> (SIDE * side)) & 0xFF
+            if mine == 0:
+                continue
             if side == 0:
-                edge, there = mask & FIRST_ROW, block - across
-                if edge == ZERO or top == 0:
-                    continue
+                there, line, outside = block - across, top - 1, top == 0
             elif side == 1:
-                edge, there = (mask >> LAST_ROW) & FIRST_ROW, block + across
-                if edge == ZERO or block // across + 1 >= high:
-                    continue
+                there, line = block + across, top + SIDE
+                outside = block_row + 1 == tall
             elif side == 2:
-                edge, there = mask & FIRST_COLUMN, block - 1
-                if edge == ZERO or left == 0:
-                    continue
+                there, line, outside = block - 1, left - 1, left == 0
             else:
-                edge, there = (mask >> LAST_BIT) & FIRST_COLUMN, block + 1
-                if edge == ZERO or block % across + 1 >= across:
-                    continue
+                there, line = block + 1, left + SIDE
+                outside = block_column + 1 == across
+            if outside:
+                continue
+            first = left if side < 2 else top
             work += know(cost, wall, dearest, columns, there, regions)
-            for region in range(there * MOST, there * MOST + np.int64(regions.count[there])):
-                work += TOUCHED
-                across_edge = regions.mask[region]
-                if side == 0:
-                    across_edge = (across_edge >> LAST_ROW) & FIRST_ROW
-                elif side == 1:
-                    across_edge = across_edge & FIRST_ROW
-                elif side == 2:
-                    across_edge = (across_edge >> LAST_BIT) & FIRST_COLUMN
-                else:
-                    across_edge = across_edge & FIRST_COLUMN
-                join = edge & across_edge
-                if join == ZERO:
+            for number in range(np.int64(regions.count[there])):
+                region = number * count + there
+                join = mine & (np.int64(edge[region]) >> (SIDE * (side ^ 1)))
+                if join == 0:
                     continue
-                known = label[region] > base - SPAN
-                if known and slot[region] == CLOSED:
+                old = label[region]
+                known = old > base - SPAN
+                if known and old & 1:
                     continue
-                least, entry, way = SPAN, np.int64(-1), np.int64(0)
-                for place in range(SIDE):
-                    bit = place if side < 2 else place * SIDE
-                    if (join >> np.uint64(bit)) & ONE == ZERO:
-                        continue
-                    if side == 0:
-                        row, column = top - 1, left + place
-                    elif side == 1:
-                        row, column = top + SIDE, left + place
-                    elif side == 2:
-                        row, column = top + place, left - 1
+                from_row, from_column, from_g, from_cell = bend_row, bend_column, bend_g, bend
+                row, column = line, line
+                for turn in range(2):
+                    if side < 2:
+                        place = crossing(from_row, from_column, goal_row, goal_column, line)
                     else:
-                        row, column = top + place, left + SIDE
-                    way_here = least_way(row - pin_row, column - pin_column, diagonals)
+                        place = crossing(from_column, from_row, goal_column, goal_row, line)
+                    place = first + NEAREST[join, min(max(place - first, 0), SIDE - 1)]
+                    if side < 2:
+                        column = place
+                    else:
+                        row = place
+                    if turn == 1 or bend == pin:
+                        break
+                    if upright:
+                        seen = _in_sight(door, left, pin_row, bend_row, bend_column, row, column)
+                    else:
+                        seen = _in_sight(door, top, pin_column, bend_column, bend_row, column, row)
+                    if seen:
+                        break
+                    from_row, from_column, from_g, from_cell = pin_row, pin_column, pin_g, pin
+                g = from_g + least_way(row - from_row, column - from_column, diagonals)
+                h = least_way(row - goal_row, column - goal_column, diagonals)
+                exit = np.int64(0)
+                if reached > 0:
+                    start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
+                    exit = start + (place - first) * stride
+                if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
+                    # The way goes round something within the block, and may bend anywhere.
+                    least, best = SPAN, np.int64(0)
+                    for place in range(SIDE):
+                        if (join >> place) & 1 == 0:
+                            continue
+                        more = detour(waves, reached, inside, start + place * stride, diagonals)
+                        row = line if side < 2 else first + place
+                        column = first + place if side < 2 else line
+                        g = pin_g + STRAIGHT * more
+                        g += least_way(row - pin_row, column - pin_column, diagonals)
+                        h = least_way(row - goal_row, column - goal_column, diagonals)
+                        if g + h < least:
+                            least, best = g + h, first + place
+                    row = line if side < 2 else best
+                    column = best if side < 2 else line
                     h = least_way(row - goal_row, column - goal_column, diagonals)
-                    if way_here + h < least:
-                        least, entry, way = way_here + h, row * columns + column, way_here
-                new_g = g + way
-                f = new_g + (least - way) * percent // 100
-                if known and f >= key[slot[region]]:
+                    g, from_cell = least - h, row * columns + column
+                f = g + h * percent // 100
+                if known and f >= cheapest[region]:
                     continue
-                label[region] = base - new_g
-                run.pin[region] = entry
-                run.parent[region] = here
-                if known:
-                    place = np.int64(slot[region])
+                label[region], cheapest[region] = base - g, f
+                pins[region] = row * columns + column
+                bends[region] = from_cell
+                doors[region] = join | (side ^ 1) << SIDE
+                parents[region] = here
+                if unused >= 0:
+                    place, unused = unused, np.int64(behind[unused])
                 else:
-                    place = size
-                    size += 1
-                sift_up(place, region, f, heap, slot, key, label)
-    run.state[0] = 0
-    return NO_PATH, work
+                    place = fresh
+                    fresh += 1
+                number = f >> shift
+                entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
+                bucket[number & (BUCKETS - 1)] = place
+                opened += 1
+                current, low, high = min(current, number), min(low, number), max(high, number)
+    state[CURRENT], state[OPENED] = current, opened
+    state[LOW], state[HIGH], state[FRESH], state[UNUSED] = low, high, fresh, unused
+    return found, work
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

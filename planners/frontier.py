@@ -14,6 +14,12 @@ from numba import njit
 
 from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
 
+ONE, SIDE_BITS = np.uint64(1), np.uint64(8)
+NOT_FIRST = ~np.uint64(0x0101010101010101)
+NOT_LAST = ~np.uint64(0x8080808080808080)
+"""In a word whose bit 8·row + column is a cell of a block: a step to the right and one down, all
+cells but those of the first column, and but those of the last."""
+
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def octile(rows, columns):
@@ -104,14 +110,29 @@ def step_cost(cost, wall, columns, node, dr, dc):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def step_between(node, there, columns):
+    """Return the step (dr, dc) from a cell to one of its neighbours, by flat indices."""
+    if columns < 3:  # several steps are the same difference
+        return there // columns - node // columns, there % columns - node % columns
+    apart = there - node
+    down = (1 if apart > 1 else 0) - (1 if apart < -1 else 0)
+    return down, apart - down * columns
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def cells_of(path, columns):
     """Return a path as int32 [n, 2] cells, and how many of its steps are diagonal."""
     cells, diagonal = np.empty((path.size, 2), np.int32), 0
+    if path.size == 0:
+        return cells, diagonal
+    node = np.int64(path[0])
+    row, column = node // columns, node % columns
     for place in range(path.size):
-        cells[place, 0] = path[place] // columns
-        cells[place, 1] = path[place] % columns
-        if place > 0 and cells[place, 0] != cells[place - 1, 0]:
-            diagonal += cells[place, 1] != cells[place - 1, 1]
+        there = np.int64(path[place])
+        down, across = step_between(node, there, columns)
+        row, column, node = row + down, column + across, there
+        diagonal += down != 0 and across != 0
+        cells[place, 0], cells[place, 1] = row, column
     return cells, diagonal
 
 
@@ -133,7 +154,7 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
     """Read the path from `start` to `node` back from the labels of the last search."""
     rows, base, label = cost.size // columns, work.clock[0], work.label
     path = np.empty(64, np.int32)
-    count = 0
+    count, row, column = 0, node // columns, node % columns
     while True:
         if count == path.size:
             path = with_room(path, count, 2 * count)
@@ -141,8 +162,7 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
         count += 1
         if node == start:
             return path[:count][::-1].copy()
-        row, column = node // columns, node % columns
-        best, best_label = node, base - SPAN
+        best, best_label, best_dr, best_dc = node, base - SPAN, 0, 0
         for dr in range(-1, 2):
             if row + dr < 0 or row + dr >= rows:
                 continue
@@ -157,5 +177,41 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
                 step = step_cost(cost, wall, columns, there, -dr, -dc)
                 # Every label is the length of a real way, so the best neighbour is closer by it.
                 if step > 0 and label[there] - step > best_label:
-                    best, best_label = there, label[there] - step
-        node = best
+                    best, best_label, best_dr, best_dc = there, label[there] - step, dr, dc
+        node, row, column = best, row + best_dr, column + best_dc
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def wave(reached, mask, diagonals):
+    """The cells of a region that one more step leads to, with those already reached."""
+    east, west = (mask >> ONE) & NOT_LAST, (mask << ONE) & NOT_FIRST
+    south, north = mask >> SIDE_BITS, mask << SIDE_BITS
+    more = ((reached << ONE) & NOT_FIRST) | ((reached >> ONE) & NOT_LAST)
+    more |= (reached << SIDE_BITS) | (reached >> SIDE_BITS)
+    if diagonals:  # both orthogonal cells are free, so corners are not cut
+        more |= ((reached & east & south) << (SIDE_BITS + ONE)) & NOT_FIRST
+        more |= ((reached & west & south) << (SIDE_BITS - ONE)) & NOT_LAST
+        more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
+        more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
+    return (more & mask) | reached
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def flood(mask, start, diagonals, waves):
+    """Write the waves from a cell through a region of a block; return how many steps they go."""
+    waves[0], count = ONE << np.uint64(start), 0
+    while waves[count] != mask:
+        waves[count + 1] = wave(waves[count], mask, diagonals)
+        count += 1
+    return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def detour(waves, count, start, goal, diagonals):
+    """How many steps more than on a free floor a way has between two cells of a flooded region."""
+    down, along = abs((start >> 3) - (goal >> 3)), abs((start & 7) - (goal & 7))
+    least = max(down, along) if diagonals else down + along
+    steps, bit = least, ONE << np.uint64(goal)
+    while steps < count and waves[steps] & bit == np.uint64(0):
+        steps += 1
+    return steps - least

@@ -1,4 +1,4 @@
-"""A way that is made shorter: best-first search in a corridor around it, and in windows along it.
+"""A way that is made shorter: best-first search on the whole map, and in windows along it.
 
 A search gives its time back after any number of expansions and goes on later. It knows the way in
 hand: nothing is expanded that cannot beat it, and where the search comes to a cell of that way more
@@ -11,116 +11,175 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import least_way, next_base, path_to, pop, sift_up, step_cost, with_room
-from planners.search import CLOSED, DIAGONAL, LAST, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
+from planners.frontier import next_base, path_to, step_between, step_cost, with_room
+from planners.search import DIAGONAL, LAST, OUT_OF_BUDGET, SPAN, STRAIGHT, WALL
 
-FRONTIER = "84699215c6e2"
+FRONTIER = "e939f8aacbfe"
 
-FOUND = 0
-SIZE, BASE, UPPER, GAIN, MEETING, CONFINED, FOLLOWS = range(7)
-PERCENT, LOWEST, COUNT, POSITION = range(7, 11)
-"""State of a search: nodes in the heap; base of its labels; cost of the way in hand; by how much it
-is beaten, and at which cell; whether a corridor confines it, and whether it knows the way's cost up
-to each cell; its weight; the least f taken so far. Of the way: its cells; where the next window
-begins."""
-BLOCK_SHIFT = 3
-"""A corridor is made of blocks of 8 x 8 cells."""
-_WEIGHT_SHIFT = 16
-WINDOW_BUDGET = 4000
-"""Expansions after which a window is given up."""
+DONE = 0
+BUCKETS = 1 << 13
+BASE, SHIFT, CURRENT, LOW, HIGH, OPENED, FRESH, UNUSED = range(8)
+EXACT, FOLLOWS, UPPER, GAIN, MEETING, COUNT, POSITION = range(8, 15)
+"""State of a search: base of its labels; width of a bucket, as a shift; the bucket at work, the
+lowest and the highest used; entries in all of them; the first entry never used, the first given
+back. Whether its norm is a lower bound; whether it knows the way's cost up to each cell; cost of
+the way in hand; by how much it is beaten, and at which cell. Of the way: its cells; where the next
+window begins."""
+NOTHING = -1
+_NARROW = 12  # 4 096 is less than the smallest positive step of f on a free floor
+_ENTRIES = 8
+_WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
 
 class Run(NamedTuple):
     """Arrays of one planner at work. They are zeroed pages until they are touched.
 
-    Of every cell: label (`base` - g), its slot in the heap, prefix (`base` + cost of the way
-    in hand up to the cell). heap, key: nodes and their f. mark: of every block, the base of the
-    search whose corridor it is in. path: flat indices of the way in hand.
+    Of every cell: label (`base` - g, one less when it is closed), prefix (`base` + cost of the way
+    in hand up to the cell). bucket: the first entry of each. entry, behind: an entry's cell and the
+    entry after it. norm: the heuristic, see `estimated`. path: flat indices of the way in hand.
     """
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]
-    key: NDArray[np.int64]
-    heap: NDArray[np.int32]
-    slot: NDArray[np.int32]
     prefix: NDArray[np.int64]
-    mark: NDArray[np.int64]
+    bucket: NDArray[np.int32]
+    entry: NDArray[np.int32]
+    behind: NDArray[np.int32]
+    norm: NDArray[np.int64]
     path: NDArray[np.int32]
     state: NDArray[np.int64]
 
 
 def new_run(rows: int, columns: int) -> Run:
     """Arrays for a map of that size."""
-    cells, across = rows * columns, 1 << BLOCK_SHIFT
-    blocks = -(-rows // across) * -(-columns // across)
+    cells = rows * columns
     return Run(
         clock=np.zeros(1, np.int64),
         label=np.zeros(cells, np.int64),
-        key=np.zeros(cells, np.int64),
-        heap=np.zeros(cells, np.int32),
-        slot=np.zeros(cells, np.int32),
         prefix=np.zeros(cells, np.int64),
-        mark=np.zeros(blocks, np.int64),
+        bucket=np.full(BUCKETS, NOTHING, np.int32),
+        entry=np.zeros(_ENTRIES * cells, np.int32),
+        behind=np.zeros(_ENTRIES * cells, np.int32),
+        norm=np.zeros(6, np.int64),
         path=np.zeros(cells + 1, np.int32),
-        state=np.zeros(11, np.int64),
+        state=np.zeros(15, np.int64),
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin(start, percent, upper, run):
-    """Begin a search whose result must cost less than `upper`."""
-    if run.clock[0] >= LAST:  # the labels are about to be cleared: these go by the same bases
-        run.prefix[:] = 0
-        run.mark[:] = 0
-    base = next_base(run)
-    run.state[SIZE], run.state[BASE] = 1, base
-    run.state[UPPER], run.state[GAIN], run.state[MEETING] = upper, 0, -1
-    run.state[CONFINED], run.state[FOLLOWS] = 0, 0
-    run.state[PERCENT], run.state[LOWEST] = percent, 0
-    run.label[start] = base
-    run.key[0] = 0
-    run.heap[0] = start
-    run.slot[start] = 0
+def estimated(rows, columns, norm):
+    """What a way costs by a norm: the greatest of three sums `norm[2i]` · far + `norm[2i+1]` · near
+    over the greater and the smaller of the distances."""
+    far, near = abs(rows), abs(columns)
+    if near > far:
+        far, near = near, far
+    return max(
+        norm[0] * far + norm[1] * near,
+        norm[2] * far + norm[3] * near,
+        norm[4] * far + norm[5] * near,
+    )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def search(cost, wall, columns, start, goal, diagonals, floor, run, budget):
-    """Go on with the search; return (FOUND or NO_PATH or OUT_OF_BUDGET, expansions).
+def _width(rows, columns, norm):
+    """The width of a bucket, as a shift, with which all that is open at once fits into the ring.
 
-    f = g + percent/100 · h, where h is the least way · `floor`, the cheapest cost of a cell. Each
-    node is closed once, so at 100 % the result is the shortest in the corridor; NO_PATH says that
-    nothing beats the way in hand, as it is after `GAIN`.
+    On the way to the goal f falls by what the norm says beyond the least way, and with one step it
+    rises by the dearest of them.
+    """
+    spread = estimated(rows, columns, norm) - STRAIGHT * max(rows, columns)
+    spread += (WALL + 1) * DIAGONAL + 2 * (norm[4] + norm[5])
+    shift = _NARROW
+    while spread >> shift >= BUCKETS // 2:
+        shift += 1
+    return shift
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def begin(cost, columns, start, goal, upper, exact, run):
+    """Begin a search by `run.norm`, which is `exact` if it never says too much, whose result must
+    cost less than `upper`."""
+    if run.clock[0] >= LAST:  # the labels are about to be cleared: these go by the same bases
+        run.prefix[:] = 0
+    base, state, norm, bucket = next_base(run), run.state, run.norm, run.bucket
+    for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
+        bucket[place & (BUCKETS - 1)] = NOTHING
+    shift = _width(cost.size // columns, columns, norm)
+    f = estimated(start // columns - goal // columns, start % columns - goal % columns, norm)
+    state[BASE], state[SHIFT], state[EXACT] = base, shift, exact
+    state[CURRENT] = state[LOW] = state[HIGH] = f >> shift
+    state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
+    state[UPPER], state[GAIN], state[MEETING] = upper, 0, NOTHING
+    state[FOLLOWS] = 0
+    run.label[start] = base
+    run.entry[0], run.behind[0] = start, NOTHING
+    bucket[state[CURRENT] & (BUCKETS - 1)] = 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def search(cost, wall, columns, goal, diagonals, run, budget):
+    """Go on with the search; return (DONE or OUT_OF_BUDGET, expansions).
+
+    It is done when nothing open can beat the way in hand, as it is after `GAIN`; without an exact
+    norm also when it has come to the goal, and then a node is closed for good. With an exact one
+    the buckets correct labels: a node may be expanded twice while the same bucket is at work.
     """
     # Arrays are taken out of the tuple once: inside the loop that would count references.
-    state, label, key, heap, slot = run.state, run.label, run.key, run.heap, run.slot
-    prefix, mark, follows = run.prefix, run.mark, state[FOLLOWS] != 0
-    rows, across = cost.size // columns, (columns + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    base, percent, confined = state[BASE], state[PERCENT], state[CONFINED] != 0
-    weight = (percent << _WEIGHT_SHIFT) // 100  # a division for every node would be felt
-    size, upper, expansions = state[SIZE], state[UPPER] - state[GAIN], 0
+    state, label, prefix, norm = run.state, run.label, run.prefix, run.norm
+    bucket, entry, behind = run.bucket, run.entry, run.behind
+    one_far, one_near, two_far, two_near, three_far, three_near = (
+        norm[0], norm[1], norm[2], norm[3], norm[4], norm[5],
+    )  # fmt: skip
+    rows = cost.size // columns
+    exact, follows = state[EXACT] != 0, state[FOLLOWS] != 0
+    base, shift, current, opened = state[BASE], state[SHIFT], state[CURRENT], state[OPENED]
+    low, high, fresh, unused = state[LOW], state[HIGH], state[FRESH], state[UNUSED]
     goal_row, goal_column = goal // columns, goal % columns
-    while size > 0:
-        if expansions >= budget:
-            state[SIZE] = size
-            return OUT_OF_BUDGET, expansions
-        f = key[0]
-        node = pop(size, heap, slot, key, label)
-        size -= 1
-        expansions += 1
-        g = base - label[node]
-        row, column = node // columns, node % columns
-        if g + floor * least_way(row - goal_row, column - goal_column, diagonals) >= upper:
-            if percent == 100:  # and so have all others
+    inverse = 1.0 / columns  # a division of integers would take a third of the time
+    upper, expansions, found = state[UPPER] - state[GAIN], 0, DONE
+    stale = base - SPAN
+    while opened > 0:
+        place = np.int64(bucket[current & (BUCKETS - 1)])
+        if place < 0:
+            current += 1
+            if current << shift >= upper:
                 break
             continue
-        if node == goal:
-            state[SIZE] = size
-            return FOUND, expansions
-        if percent == 100:
-            state[LOWEST] = max(state[LOWEST], f)
+        if expansions >= budget:
+            found = OUT_OF_BUDGET
+            break
+        bucket[current & (BUCKETS - 1)] = behind[place]
+        behind[place], unused = unused, place
+        opened -= 1
+        node = np.int64(entry[place])
+        mine = label[node]
+        if mine & 1:  # closed
+            continue
+        g = base - mine
+        row = int((node + 0.5) * inverse)
+        column = node - row * columns
+        down, along = row - goal_row, column - goal_column
+        far, near = abs(down), abs(along)
+        if near > far:
+            far, near = near, far
+        f = g + max(
+            one_far * far + one_near * near,
+            two_far * far + two_near * near,
+            three_far * far + three_near * near,
+        )
+        if f >> shift != current or f >= upper:  # it has another entry, or cannot beat the way
+            continue
+        label[node] = mine - 1
         if follows and prefix[node] >= base and prefix[node] - base - g > state[GAIN]:
             state[GAIN], state[MEETING] = prefix[node] - base - g, node
             upper = state[UPPER] - state[GAIN]
+        if node == goal:
+            state[GAIN], state[MEETING] = state[UPPER] - g, goal
+            upper = g
+            if exact:
+                continue
+            break
+        expansions += 1
         # Cells off the map are walls; the orthogonal ones are read once for the diagonals.
         north = int(cost[node - columns]) if row > 0 else wall
         south = int(cost[node + columns]) if row + 1 < rows else wall
@@ -152,42 +211,69 @@ def search(cost, wall, columns, start, goal, diagonals, floor, run, budget):
                     continue
             new_g = g + (STRAIGHT if side < 4 else DIAGONAL) * max(swept, one, other)
             old = label[there]
-            if base - new_g <= old:
+            if base - new_g <= old + 1:
                 continue
-            known = old > base - SPAN
-            if known and slot[there] == CLOSED:
+            known = old > stale
+            if known and old & 1 and not exact:
                 continue
-            if confined:
-                block = ((row + dr) >> BLOCK_SHIFT) * across + ((column + dc) >> BLOCK_SHIFT)
-                if mark[block] != base:
-                    continue
-            h = floor * least_way(row + dr - goal_row, column + dc - goal_column, diagonals)
+            far, near = abs(down + dr), abs(along + dc)
+            if near > far:
+                far, near = near, far
+            h = max(
+                one_far * far + one_near * near,
+                two_far * far + two_near * near,
+                three_far * far + three_near * near,
+            )
             if new_g + h >= upper:
                 continue
             label[there] = base - new_g
-            if known:
-                place = np.int64(slot[there])
+            number = (new_g + h) >> shift
+            if known and not old & 1 and (base - old + h) >> shift == number:
+                continue
+            if unused >= 0:
+                place, unused = unused, np.int64(behind[unused])
             else:
-                place = size
-                size += 1
-            f_there = new_g + (h * weight >> _WEIGHT_SHIFT)
-            sift_up(place, there, f_there, heap, slot, key, label)
-    state[SIZE] = 0
-    return NO_PATH, expansions
+                place = fresh
+                fresh += 1
+            entry[place], behind[place] = there, bucket[number & (BUCKETS - 1)]
+            bucket[number & (BUCKETS - 1)] = place
+            opened += 1
+            if number < current:
+                current = number
+                low = min(low, number)
+            elif number > high:
+                high = number
+    state[CURRENT], state[OPENED] = current, opened
+    state[LOW], state[HIGH], state[FRESH], state[UNUSED] = low, high, fresh, unused
+    return found, expansions
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def reweigh(columns, goal, diagonals, floor, percent, run):
-    """Go on with another weight: order the open nodes anew."""
-    state, label, key, heap, slot = run.state, run.label, run.key, run.heap, run.slot
-    state[PERCENT] = percent
-    weight = (percent << _WEIGHT_SHIFT) // 100
-    goal_row, goal_column = goal // columns, goal % columns
-    for place in range(state[SIZE]):
-        node = np.int64(heap[place])
-        g = state[BASE] - label[node]
-        h = floor * least_way(node // columns - goal_row, node % columns - goal_column, diagonals)
-        sift_up(place, node, g + (h * weight >> _WEIGHT_SHIFT), heap, slot, key, label)
+def reweigh(columns, goal, run):
+    """Go on with another norm that is not exact: put what is open into other buckets."""
+    state, label, bucket, entry, behind = run.state, run.label, run.bucket, run.entry, run.behind
+    waiting, count, rows = np.empty(state[OPENED], np.int32), 0, label.size // columns
+    for number in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
+        place = np.int64(bucket[number & (BUCKETS - 1)])
+        bucket[number & (BUCKETS - 1)] = NOTHING
+        while place >= 0:
+            waiting[count] = entry[place]
+            count += 1
+            place = np.int64(behind[place])
+    state[LOW], state[HIGH], state[UNUSED] = 1 << 60, 0, NOTHING
+    state[SHIFT] = _width(rows, columns, run.norm)
+    opened = 0
+    for place in range(count):
+        node = np.int64(waiting[place])
+        if label[node] & 1:
+            continue
+        h = estimated(node // columns - goal // columns, node % columns - goal % columns, run.norm)
+        number = (state[BASE] - label[node] + h) >> state[SHIFT]
+        entry[opened], behind[opened] = node, bucket[number & (BUCKETS - 1)]
+        bucket[number & (BUCKETS - 1)] = opened
+        opened += 1
+        state[LOW], state[HIGH] = min(state[LOW], number), max(state[HIGH], number)
+    state[CURRENT], state[OPENED], state[FRESH] = state[LOW], opened, opened
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -196,7 +282,7 @@ def way_cost(cost, wall, columns, path, first, last):
     total = np.int64(0)
     for place in range(first, last):
         node, there = np.int64(path[place]), np.int64(path[place + 1])
-        down, across = there // columns - node // columns, there % columns - node % columns
+        down, across = step_between(node, there, columns)
         total += step_cost(cost, wall, columns, node, down, across)
     return total
 
@@ -208,6 +294,8 @@ def so_far(cost, wall, columns, start, diagonals, run):
     if node < 0:
         return run.path[:count].copy()
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
+    if count == 0 or node == run.path[count - 1]:
+        return beginning
     rest = 0
     while run.path[rest] != node:
         rest += 1
@@ -218,20 +306,17 @@ def so_far(cost, wall, columns, start, diagonals, run):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def take_up(cost, wall, columns, start, node, diagonals, run):
-    """Take up what the last search found: its way to `node`, and from there on the way in hand.
+def take_up(cost, wall, columns, start, diagonals, run):
+    """Take up what the last search found: its way to `MEETING`, and then the way in hand.
 
     Returns the cost of the new way.
     """
+    node, count, rest = run.state[MEETING], run.state[COUNT], 0
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
-    count, rest = run.state[COUNT], 0
-    if count == 0 or node == run.path[count - 1]:
-        run.path[: beginning.size] = beginning
-        run.state[COUNT] = beginning.size
-    else:
-        while run.path[rest] != node:
-            rest += 1
-        _replace(run, 0, rest, beginning)
+    run.state[MEETING] = NOTHING
+    while rest < count and run.path[rest] != node:
+        rest += 1
+    _replace(run, 0, min(rest, count - 1), beginning)
     return way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
 
 
@@ -263,34 +348,11 @@ def follow_way(cost, wall, columns, run):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def confine(rows, columns, radius, run):
-    """Confine the search that has begun to the blocks at most `radius` steps from the way in hand.
-
-    Returns how many blocks were touched.
-    """
-    high = (rows + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    wide = (columns + (1 << BLOCK_SHIFT) - 1) >> BLOCK_SHIFT
-    base, touched, before = run.state[BASE], 0, -1
-    run.state[CONFINED] = 1
-    for place in range(run.state[COUNT]):
-        node = np.int64(run.path[place])
-        row, column = (node // columns) >> BLOCK_SHIFT, (node % columns) >> BLOCK_SHIFT
-        if row * wide + column == before:
-            continue
-        before = row * wide + column
-        for r in range(max(row - radius, 0), min(row + radius + 1, high)):
-            left = radius - abs(r - row)
-            for c in range(max(column - left, 0), min(column + left + 1, wide)):
-                touched += 1
-                run.mark[r * wide + c] = base
-    return touched
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def improve_windows(cost, wall, columns, length, diagonals, floor, run, budget):
+def improve_windows(cost, wall, columns, length, diagonals, run, budget):
     """Make the way in hand the shortest in windows of `length` cells, half of each in the next.
 
-    Returns (done, expansions). A window that is as short as can be costs nothing.
+    Returns (done, expansions). `run.norm` must be exact. A window that is as short
+    as can be costs nothing.
     """
     state, path, expansions = run.state, run.path, 0
     while state[POSITION] < state[COUNT] - 1:
@@ -301,13 +363,11 @@ def improve_windows(cost, wall, columns, length, diagonals, floor, run, budget):
         start, goal = np.int64(path[first]), np.int64(path[last])
         before = way_cost(cost, wall, columns, path, first, last)
         down, across = goal // columns - start // columns, goal % columns - start % columns
-        if before > floor * least_way(down, across, diagonals):
-            begin(start, 100, before, run)
-            found, taken = search(
-                cost, wall, columns, start, goal, diagonals, floor, run, WINDOW_BUDGET
-            )
+        if before > estimated(down, across, run.norm):
+            begin(cost, columns, start, goal, before, True, run)
+            _, taken = search(cost, wall, columns, goal, diagonals, run, _WINDOW_BUDGET)
             expansions += taken
-            if found == FOUND:
+            if state[MEETING] >= 0:
                 piece = path_to(cost, wall, columns, start, goal, diagonals, run)
                 _replace(run, first, last, piece)
                 last = first + piece.size - 1

@@ -98,6 +98,7 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
     current = (STRAIGHT * max(down, across) + minor * min(down, across)) >> BUCKET_SHIFT
     label[start], slot[start] = base, current
     entry[0], behind[0], bucket[current & (BUCKETS - 1)] = start, NOTHING, 0
+    inverse = 1.0 / columns  # a division of integers would take a third of the time
     upper, expansions, opened, fresh, unused = SPAN, 0, 1, np.int64(1), np.int64(NOTHING)
     while opened > 0:
         place = np.int64(bucket[current & (BUCKETS - 1)])
@@ -114,7 +115,7 @@ def bucket_search(cost, wall, columns, start, goal, diagonals, budget, work):
             continue
         slot[node] = CLOSED
         g = base - label[node]
-        row = node // columns
+        row = int((node + 0.5) * inverse)
         column = node - row * columns
         down, across = row - goal_row, column - goal_column
         near, far = abs(down), abs(across)

@@ -8,22 +8,19 @@ import numpy as np
 from numba import njit
 
 from planners.blocks import (
+    ALL,
     FIRST_COLUMN,
     FIRST_ROW,
     LAST_BIT,
+    LAST_REGION,
     LAST_ROW,
-    MOST,
-    NOT_FIRST,
-    NOT_LAST,
-    ONE,
     SIDE,
-    SIDE_BITS,
     ZERO,
 )
-from planners.frontier import least_way, step_cost
-from planners.search import DIAGONAL, SPAN
+from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
+from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-FRONTIER = "84699215c6e2"
+FRONTIER = "e939f8aacbfe"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -37,24 +34,29 @@ def pins_of(columns, goal, diagonals, regions, run):
     its neighbours, `TAUT` times. Returns (pins, the regions that they
     enter, cells touched).
     """
-    count, region = 2, run.state[2]
+    count, region = 2, run.state[LAST_REGION]
     while run.parent[region] >= 0:
         count += 1
         region = run.parent[region]
     pins, way = np.empty(count, np.int32), np.empty(count - 1, np.int64)
     pins[count - 1] = goal
-    region = run.state[2]
+    region = run.state[LAST_REGION]
     for place in range(count - 2, -1, -1):
         pins[place] = run.pin[region]
         way[place] = region
         region = run.parent[region]
-    across, touched = (columns + SIDE - 1) // SIDE, 0
+    across, blocks, touched = (columns + SIDE - 1) // SIDE, regions.count.size, 0
+    coming, going = np.empty(SIDE * SIDE + 1, np.uint64), np.empty(SIDE * SIDE + 1, np.uint64)
+    from_cell = to_cell = np.int64(0)
     for turn in range(TAUT):
         for step in range(1, count - 1):
-            place = step if turn % 2 == 0 else count - 1 - step
-            here, block = way[place], way[place] // MOST
-            side = way[place - 1] // MOST - block
-            before, after = np.int64(pins[place - 1]), np.int64(pins[place + 1])
+            place = step if turn % 2 == 1 else count - 1 - step
+            here, block = way[place], way[place] % blocks
+            side = way[place - 1] % blocks - block
+            # At first from where the way bends, which may lie several regions back.
+            bent = turn > 0 or run.bend[here] == run.pin[here]
+            before = np.int64(pins[place - 1] if bent else run.bend[here])
+            after = np.int64(pins[place + 1])
             first = block // across * SIDE * columns + block % across * SIDE
             mask, other = regions.mask[here], regions.mask[way[place - 1]]
             if side == -across:
@@ -67,6 +69,20 @@ def pins_of(columns, goal, diagonals, regions, run):
             else:
                 join, stride = (mask >> LAST_BIT) & FIRST_COLUMN & other, columns
                 first += SIDE - 1
+            # What stands within the two blocks may make one cell a longer way than another.
+            top, left = block // across * SIDE, block % across * SIDE
+            came = went = np.int64(0)
+            if bent and other != ALL:
+                r = before // columns - way[place - 1] % blocks // across * SIDE
+                c = before % columns - way[place - 1] % blocks % across * SIDE
+                from_cell = r * SIDE + c
+                came = flood(other, from_cell, diagonals, coming)
+            if mask != ALL:
+                r = min(max(after // columns - top, 0), SIDE - 1)
+                c = min(max(after % columns - left, 0), SIDE - 1)
+                to_cell = r * SIDE + c
+                went = flood(mask, to_cell, diagonals, going)
+            touched += came + went
             least = SPAN
             for along in range(SIDE):
                 bit = along if stride == 1 else along * SIDE
@@ -77,6 +93,14 @@ def pins_of(columns, goal, diagonals, regions, run):
                 row, column = cell // columns, cell % columns
                 there = least_way(row - before // columns, column - before % columns, diagonals)
                 there += least_way(row - after // columns, column - after % columns, diagonals)
+                inside = (row - top) * SIDE + column - left
+                if went > 0:
+                    there += STRAIGHT * detour(going, went, to_cell, inside, diagonals)
+                if came > 0:
+                    # The cell beside it, in the block before.
+                    beside = inside + (56 if side == -across else -56 if side == across
+                                       else 7 if side == -1 else -7)  # fmt: skip
+                    there += STRAIGHT * detour(coming, came, from_cell, beside, diagonals)
                 if there < least:
                     least = there
                     pins[place] = cell
@@ -115,21 +139,6 @@ def _line(cost, wall, dearest, columns, start, goal, diagonals, straight_first, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _wave(reached, mask, diagonals):
-    """The cells of a region that one more step leads to, with those already reached."""
-    east, west = (mask >> ONE) & NOT_LAST, (mask << ONE) & NOT_FIRST
-    south, north = mask >> SIDE_BITS, mask << SIDE_BITS
-    more = ((reached << ONE) & NOT_FIRST) | ((reached >> ONE) & NOT_LAST)
-    more |= (reached << SIDE_BITS) | (reached >> SIDE_BITS)
-    if diagonals:  # both orthogonal cells are free, so corners are not cut
-        more |= ((reached & east & south) << (SIDE_BITS + ONE)) & NOT_FIRST
-        more |= ((reached & west & south) << (SIDE_BITS - ONE)) & NOT_LAST
-        more |= ((reached & east & north) >> (SIDE_BITS - ONE)) & NOT_FIRST
-        more |= ((reached & west & north) >> (SIDE_BITS + ONE)) & NOT_LAST
-    return (more & mask) | reached
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _within(mask, start, goal, diagonals, steps):
     """A way with the fewest steps between two cells of a region, straight ones where it can.
 
@@ -139,7 +148,7 @@ def _within(mask, start, goal, diagonals, steps):
     waves[0] = ONE << np.uint64(start)
     count, target = 0, ONE << np.uint64(goal)
     while waves[count] & target == ZERO:
-        waves[count + 1] = _wave(waves[count], mask, diagonals)
+        waves[count + 1] = wave(waves[count], mask, diagonals)
         count += 1
     here = goal
     for step in range(count):
@@ -209,7 +218,7 @@ def connect(cost, wall, dearest, columns, pins, way, regions, diagonals, path):
             here = reached
             continue
         goal = np.int64(pins[here + 1])
-        block = way[here] // MOST
+        block = way[here] % regions.count.size
         top, left = block // across * SIDE, block % across * SIDE
         # The cell of this region from which the next is entered; the last pin lies in this one.
         row = min(max(goal // columns, top), top + SIDE - 1)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from planners import Grid, ara, paper_steps, steps
 from planners.frontier import cells_of, path_to
 from planners.grids import endpoints
-from planners.improving import FOUND, begin, new_run, search
+from planners.improving import DONE, GAIN, MEETING, UPPER, begin, new_run, search
 from planners.multipath import NO_WAY, Step, way_plan
+from planners.norms import least_norm
 from planners.path_finding import Cell
 from planners.search import OUT_OF_BUDGET, SPAN
 
@@ -32,19 +33,18 @@ def weighted(grid: Grid, start: Cell, goal: Cell) -> Iterator[Step]:
 
 
 def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -> Iterator[Step]:
-    first, last, diagonals = endpoints(grid, start, goal, 8)
+    first, last, _ = endpoints(grid, start, goal, 8)
     columns, run, known = grid.shape[1], new_run(*grid.shape), float(SPAN)
     for weight in weights:
-        begin(first, round(100 * weight), int(known), run)
+        run.norm[:] = [round(weight * each) for each in least_norm(True)]
+        begin(grid.cost, columns, first, last, int(known), weight == 1.0, run)
         found = OUT_OF_BUDGET
         while found == OUT_OF_BUDGET:
-            found, taken = search(
-                grid.cost, grid.wall, columns, first, last, diagonals, 1, run, _GRAIN
-            )
+            found, taken = search(grid.cost, grid.wall, columns, last, True, run, _GRAIN)
             plan = None
-            if found == FOUND:
-                known = float(run.clock[0] - run.label[last])
-                way = path_to(grid.cost, grid.wall, columns, first, last, diagonals, run)
+            if found == DONE and run.state[MEETING] >= 0:
+                known = float(run.state[UPPER] - run.state[GAIN])
+                way = path_to(grid.cost, grid.wall, columns, first, last, True, run)
                 plan = way_plan(*cells_of(way, columns), known, known / weight)
             yield Step(float(taken), plan)
     if known == SPAN:

@@ -224,19 +224,20 @@ def step_cost_invariant(seed: int, way: Way, floors: Floors = PERFECT) -> tuple[
     """Whether refining a segment costs approximately the same at all levels. Ours refines none."""
     if way is not PAPER:
         return (math.nan,)
-    means = list(step_costs(course(seed, way, floors)).values())
+    means = list(step_costs(_batch(seed, way, floors)).values())
     return (float(max(means) <= ALIKE * min(means)),)
 
 
-def step_costs(found: Course) -> dict[int, float]:
+def step_costs(courses: Sequence[Course]) -> dict[int, float]:
     """Mean expansions of refining a segment, by its level."""
     costs: dict[int, list[float]] = {}
-    for before, after in itertools.pairwise(range(len(found.plans))):
-        was, now = ([s.level for s in found.plans[at].segments] for at in (before, after))
-        refined = [level for level in set(was) if level and was.count(level) > now.count(level)]
-        if refined:
-            work = float(found.work[after] - found.work[before])
-            costs.setdefault(max(refined), []).append(work)
+    for found in courses:
+        for before, after in itertools.pairwise(range(len(found.plans))):
+            was, now = ([s.level for s in found.plans[at].segments] for at in (before, after))
+            refined = [level for level in set(was) if level and was.count(level) > now.count(level)]
+            if refined:
+                work = float(found.work[after] - found.work[before])
+                costs.setdefault(max(refined), []).append(work)
     return {level: float(np.mean(those)) for level, those in sorted(costs.items())}
 
 

@@ -75,8 +75,11 @@ def test_every_promised_claim_is_there_once():
     assert [claim.name for claim in nao.CLAIMS] == [f"prp.{name}" for name in NAMES]
 
 
-@pytest.mark.parametrize("way", [PAPER, OURS], ids=lambda way: way.name)
-@pytest.mark.parametrize("claim", PLANNED, ids=lambda claim: claim.name)
+@pytest.mark.parametrize(
+    ("claim", "way"),
+    [*((claim, OURS) for claim in PLANNED), *((claim, PAPER) for claim in PLANNED[:2])],
+    ids=lambda each: each.name,
+)
 def test_equal_seeds_draw_equal_figures(claim, way):
     drawn = claim.draw(3, way)
     assert len(drawn) == len(claim.values)

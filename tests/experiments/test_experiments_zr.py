@@ -57,7 +57,7 @@ def test_a_course_goes_from_the_highest_level_to_the_lowest():
     assert levels[-1] == 0
     place = mixed(found)
     assert place is None or {s.level for s in found.plans[place].segments} == {0, 1}
-    assert set(step_costs(found)) <= {1, 2, 3}
+    assert set(step_costs([found])) <= {1, 2, 3}
 
 
 def test_before_the_first_plan_there_is_none_and_after_the_last_that_one():

@@ -22,7 +22,7 @@ def regions_of(free):
         know(cost, 0, 1, columns, block, regions)
         top, left = block // across * SIDE, block % across * SIDE
         for k in range(regions.count[block]):
-            mask = int(regions.mask[block * MOST + k])
+            mask = int(regions.mask[k * regions.count.size + block])
             bits = [bit for bit in range(SIDE * SIDE) if mask >> bit & 1]
             found.add(frozenset((top + bit // SIDE, left + bit % SIDE) for bit in bits))
     return found

@@ -1,0 +1,79 @@
+"""The search that improves a way: any norm, any interruptions, and never a worse way."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planners import astar, route
+from planners.improving import (
+    DONE,
+    GAIN,
+    MEETING,
+    UPPER,
+    begin,
+    new_run,
+    reweigh,
+    search,
+    take_up,
+)  # fmt: skip
+from planners.norms import expected_norm, least_norm
+from planners.search import SPAN
+from sensing import uniform
+
+
+@st.composite
+def queries(draw):
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    shape = (draw(st.integers(2, 60)), draw(st.integers(2, 60)))
+    free = uniform(shape, draw(st.floats(0.0, 0.4)), rng)
+    free[0, 0] = free[-1, -1] = True
+    return free
+
+
+def found(cost, wall, columns, norm, exact, grain, again=None):
+    """Cost of the way from the first to the last cell, or None; searched `grain` by `grain`."""
+    run, goal = new_run(cost.size // columns, columns), cost.size - 1
+    run.norm[:] = norm
+    begin(cost, columns, 0, goal, SPAN, exact, run)
+    while search(cost, wall, columns, goal, True, run, grain)[0] != DONE:
+        if again is not None:
+            run.norm[:] = again
+            reweigh(columns, goal, run)
+            again = None
+    if run.state[MEETING] < 0:
+        return None
+    told = int(run.state[UPPER] - run.state[GAIN])
+    walked = int(take_up(cost, wall, columns, 0, True, run))
+    assert walked <= told
+    return walked
+
+
+@given(queries(), st.integers(1, 200))
+@settings(max_examples=60)
+def test_with_an_exact_norm_the_way_is_the_shortest_however_often_it_is_interrupted(free, grain):
+    best = astar(free, (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
+    cost = np.ascontiguousarray(free).view(np.uint8).reshape(-1)
+    way = found(cost, 0, free.shape[1], least_norm(True), True, grain)
+    assert way == (None if best is None else best.cost)
+
+
+@given(queries(), st.integers(1, 50), st.floats(1.0, 3.0), st.floats(1.0, 8.0))
+@settings(max_examples=60)
+def test_any_norm_finds_a_way_where_there_is_one(free, grain, scale, later):
+    best = astar(free, (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
+    cost = np.ascontiguousarray(free).view(np.uint8).reshape(-1)
+    norms = [expected_norm(0.3, each, True) for each in (scale, scale * later)]
+    way = found(cost, 0, free.shape[1], norms[0], False, grain, again=norms[1])
+    assert (way is None) == (best is None)
+    assert best is None or (way is not None and best.cost <= way)
+
+
+@given(st.integers(0, 2**32), st.integers(1, 300))
+@settings(max_examples=40)
+def test_cells_that_are_dear_do_not_overtake_each_other_in_the_ring(seed, grain):
+    rng = np.random.default_rng(seed)
+    cost = rng.choice(np.array([1, 1, 1, 7, 250, 255], np.uint8), (30, 40))
+    cost[0, 0] = cost[-1, -1] = 1
+    best = route(cost, (0, 0), (29, 39))
+    way = found(cost.reshape(-1), 255, 40, least_norm(True), True, grain)
+    assert way == (None if best is None else best.cost)
