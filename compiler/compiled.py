@@ -25,7 +25,7 @@ from compiler.calibrating import Calibration, calibrate_by_running
 from compiler.costs import stretched
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.executing import Execution, Listener, Memory, planned, status_of, unwanted
-from compiler.explaining import Explanation, certificate, explain
+from compiler.explaining import Explanation, certificate, decided, explain
 from compiler.guarding import Steps
 from compiler.objectives import EXPECTED, Objective
 from compiler.policies import Plan, Policy
@@ -290,8 +290,10 @@ class CompiledProgram:
         now = deadline.clock.now()
         output = execution.known(self.program.output)
         fault = next((part.fault for part in parts.values() if part.fault), None)
+        shares = {**allocation.shares, **execution.granted}
+        why = {label: watch.why for label, watch in execution.watches.items()}
         spent = " → ".join(
-            f"{label} {duration(part.elapsed)} of {duration(allocation.shares[label])}"
+            f"{label} {duration(part.elapsed)} of {duration(shares[label])}{why.get(label, '')}"
             for label, part in parts.items()
         )
         if output is None:
@@ -311,10 +313,28 @@ class CompiledProgram:
         )
 
     def explain(self, seconds: float) -> Explanation:
-        """Who gets how much of a budget, and what a second more would be worth to each."""
+        """Who gets how much of a budget, and what a second more would be worth to each; of an
+        adaptive schedule also what it decides while it runs."""
         seconds = _finite(seconds)
-        return explain(
-            self.name, self.tables, self.frontier, seconds, self.calibration, self.regret
+        found = explain(
+            self.name,
+            self.tables,
+            self.frontier,
+            seconds,
+            self.calibration,
+            self.regret,
+            self.objective,
+        )
+        plan = self._plan(seconds)
+        if self.policy is None or plan is None:
+            return found
+        return replace(
+            found,
+            promised=self.promise(seconds),
+            less=self.promise(0.9 * seconds),
+            more=self.promise(1.1 * seconds),
+            within=self.interval(seconds),
+            decided=decided(self.program, self.tables, self.policy, plan),
         )
 
     def advise(self, seconds: float) -> Advice:

@@ -9,7 +9,7 @@ from anytime.machines import Machine
 from anytime.modules import Module
 from anytime.profiles import Profile
 from anytime.programs import Program, program_of
-from compiler.adaptive import adapt, calibrations
+from compiler.adaptive import adapt
 from compiler.calibrating import as_tables_say, calibrate
 from compiler.compiled import CompiledProgram
 from compiler.division import divide
@@ -17,6 +17,7 @@ from compiler.guarding import guards_of
 from compiler.objectives import EXPECTED, Objective
 from compiler.regret import regret_bound
 from compiler.replaying import replay_of
+from compiler.seeing import calibrations
 from compiler.tables import tables
 
 
@@ -33,7 +34,8 @@ def compile(
 
     library: conditional profiles by module name. machine: compile for another machine's rates.
     objective: what a division is chosen for, see `compiler.expected` and its like. adaptive: decide
-    each share when its call begins, by what was achieved before, where that is worth more.
+    each share when its call begins, by what was achieved before, and whether it goes on after each
+    of its results, by what it shows, where that is worth more.
     The result is a contract program with a profile of its own. The promises of a program of plain
     calls are cross-fitted over problems, with 95 % intervals; those of others are what the tables
     say, with intervals by bootstrap over problems.
@@ -57,7 +59,7 @@ def compile(
         )
     steps = guards_of(profiles)
     replay = None
-    if _plain(program) and objective is EXPECTED:
+    if _plain(program) and objective == EXPECTED:
         # On the machine of the profiles, so that a faster one never promises less.
         there = made if machine is None else tables(program, measured)
         known = frontier if machine is None else divide(there)

@@ -18,11 +18,13 @@ from anytime.running import Run, execute
 from anytime.structure import due, only_for
 from compiler import costs
 from compiler.guarding import Steps, guard
+from compiler.policies import Share
 from compiler.tables import Table
+from compiler.watching import Watch
 
 Listener = Callable[[str, Any, Change], None]
 Memory = Mapping[str, dict[str, Any]]  # what modules keep between runs, by call
-Shares = Callable[[str, float, Mapping[str, Known]], float]  # call, seconds left, what is known
+Shares = Callable[[str, float, Mapping[str, Known]], Share]  # call, seconds left, what is known
 
 
 @dataclass
@@ -32,7 +34,8 @@ class Execution:
     planned: for each call, seconds from the start until its share ends. unwanted: calls that are
     not run. thrifty: whether the last call keeps to its share too. decide: in place of the plan,
     the share of a call when it is about to start. memory: of modules between runs, by call.
-    parts: what has been run, by label.
+    parts: what has been run, by label. granted: seconds that were decided for calls when they
+    began. watches: of calls that were watched while they ran.
     """
 
     program: Program
@@ -49,6 +52,8 @@ class Execution:
     decide: Shares | None = None
     parts: dict[str, Result] = field(default_factory=dict[str, Result])
     memory: Memory = field(default_factory=dict[str, dict[str, Any]])
+    granted: dict[str, float] = field(default_factory=dict[str, float])
+    watches: dict[str, Watch] = field(default_factory=dict[str, Watch])
 
     def __post_init__(self) -> None:
         self.started = self.deadline.clock.now()
@@ -87,8 +92,17 @@ class Execution:
         if any(argument is None for argument in found):
             self._skipped.add(call.label)  # what it needs never came, or is of an arm not taken
             return []
-        hard, ends, held = self._limits(call, clock)
+        share = None
+        if self.decide is not None:
+            left = self.deadline.at - clock.now()
+            share = self.decide(call.label, left, self._everything())
+            self.granted[call.label] = share.seconds
+        hard, ends, held = self._limits(call, clock, share)
         own = replace(self.deadline, clock=clock, at=hard if held else ends)
+        observe = None if self.on_result is None else partial(self.on_result, call.label)
+        if share is not None and share.watched:
+            watch = self.watches[call.label] = Watch(share, clock, observe)
+            own, observe = own.earlier(Deadline(clock, event=watch.over)), watch.observe
         may_step = held or Run.may_step
         self.parts[call.label], _ = execute(
             call.module,
@@ -97,13 +111,13 @@ class Execution:
             rng=self.rng,
             memory=self.memory.get(call.label),
             may_step=lambda run: not self.interrupted() and may_step(run),
-            observe=None if self.on_result is None else partial(self.on_result, call.label),
+            observe=observe,
         )
         self._settle()
         return [(call.label, self.parts[call.label])]
 
     def _limits(
-        self, call: Call, clock: Clock
+        self, call: Call, clock: Clock, share: Share | None
     ) -> tuple[float, float, Callable[[Run], bool] | None]:
         """The latest that a call may end, the end of its share, and its guard, if it has one."""
         now, latest = clock.now(), self.deadline.at
@@ -111,12 +125,9 @@ class Execution:
         first = {other.label: self.tables[other.label].first for other in rest}
         hard = latest - _least(self.tables, first)
         hard = min(hard, self.started + self._due.get(call.label, np.inf))
-        if self.decide is not None:
-            ends = now + self.decide(call.label, latest - now, self._everything())
-        else:
-            ends = self.started + self.planned[call.label]
+        ends = now + share.seconds if share else self.started + self.planned[call.label]
         if not rest:
-            ends = min(ends, latest) if self.decide or self.thrifty else latest
+            ends = min(ends, latest) if share or self.thrifty else latest
             return latest, min(ends, self.started + self._due.get(call.label, np.inf)), None
         ends = min(ends, latest)
         held = None

@@ -10,9 +10,13 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from anytime.pictures import duration, figure, line_chart, number, sparkline
+from anytime.programs import Program
 from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.costs import stretched
 from compiler.division import Frontier, divide
+from compiler.objectives import EXPECTED, Objective
+from compiler.policies import Plan, Policy
+from compiler.stopping import endings, transitions
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
@@ -40,7 +44,8 @@ class Explanation:
 
     step: seconds that prices are quoted for; less, more: promised with 10 % less or more time.
     within: the 95 % interval of the promise. regret: no division is better by more, at 95 %.
-    budgets: of the shares over time.
+    budgets: of the shares over time. decided: what an adaptive schedule decides while it runs;
+    the shares and prices are then those of the best fixed division.
     """
 
     program: str
@@ -53,6 +58,7 @@ class Explanation:
     within: tuple[float, float]
     regret: float
     budgets: tuple[float, ...]
+    decided: str = ""
 
     def __repr__(self) -> str:
         low, high = self.within
@@ -70,7 +76,7 @@ class Explanation:
                 f"  {price.label:<16.16} {duration(price.share):>9} {bar:<16}  "
                 f"{price.gain:>+13.4f}  {price.a_second:>+8.2f}  {sparkline(price.shares)}"
             )
-        lines.append(certificate(self.regret))
+        lines.append(self.decided or certificate(self.regret))
         return "\n".join(line[:100] for line in lines)
 
     def _repr_html_(self) -> str:
@@ -97,6 +103,22 @@ def certificate(regret: float) -> str:
     return f"  no division is better by more than {number(regret)} (95 %, from the profiles' bands)"
 
 
+def decided(program: Program, tables: Sequence[Table], policy: Policy, plan: Plan) -> str:
+    """What a plan decides while the program runs, of its first call in numbers, as a line."""
+    first = plan.choices[0]
+    if first.state or first.within is None:
+        return "  decided while it runs: the share of each call, by what came before"
+    table = next(table for table in tables if table.label == first.call)
+    share = policy.share(program, plan, first.call, plan.budget, {})
+    chances = endings(table.chances[0], transitions(table), share.ends).sum(axis=-1)
+    there = share.moments[chances > 1e-3].tolist()
+    mean = duration(float(chances @ share.moments))
+    return (
+        f"  decided while it runs: {first.call} ends after {duration(there[0])} … "
+        f"{duration(there[-1])} ({mean} on average) by what it shows"
+    )
+
+
 def explain(
     name: str,
     tables: Sequence[Table],
@@ -104,6 +126,7 @@ def explain(
     seconds: float,
     calibration: Calibration = AS_IT_IS,
     regret: float = 1.0,
+    objective: Objective = EXPECTED,
 ) -> Explanation:
     """The division of a budget with the price of a little more time for each call.
 
@@ -127,7 +150,7 @@ def explain(
     for place, table in enumerate(tables):
         if table.rule is not None:
             continue
-        again = divide([*tables[:place], table.ahead(step), *tables[place + 1 :]])
+        again = divide([*tables[:place], table.ahead(step), *tables[place + 1 :]], objective)
         # The division that is promised now still fits, so that the promise cannot be lower.
         gain = max(calibration.promise(again.promise(seconds)) - promised, 0.0)
         rate = gain / step if step > 0 else 0.0

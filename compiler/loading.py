@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +25,7 @@ from compiler.guarding import Steps
 from compiler.objectives import EXPECTED, Objective, at_least, cvar, quantile
 from compiler.policies import Seen
 from compiler.storing import SCHEMA, StoredNode, StoredRule, StoredSchedule, StoredTable
-from compiler.tables import Table, table_of
+from compiler.tables import Courses, Table, table_of
 
 
 def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
@@ -231,8 +231,36 @@ def _restore_table(path: Path, record: StoredTable) -> Table:
     if chances.min() < -1e-9 or (np.abs(chances.sum(axis=-1) - 1) > 1e-6).any():
         raise refuse("chances must be >= 0 and sum to 1 over the levels")
     return Table(
-        record.label, record.module, tuple(record.feeds), levels, times, chances, record.first
+        record.label,
+        record.module,
+        tuple(record.feeds),
+        levels,
+        times,
+        chances,
+        record.first,
+        courses=_courses(record, chances, refuse),
     )
+
+
+def _courses(
+    record: StoredTable, chances: Floats, refuse: Callable[[str], AnytimeError]
+) -> Courses | None:
+    if record.courses is None:
+        return None
+    moments, count = chances.shape[-2:]
+    rows, cells = record.courses.levels, record.courses.weights
+    if not rows or any(
+        len(row) != moments or not 0 <= min(row) <= max(row) < count for row in rows
+    ):
+        raise refuse("the levels of its runs are not one for each moment, of those it has")
+    if len(cells) != math.prod(record.shape[:-2]) or any(len(row) != len(rows) for row in cells):
+        raise refuse("the weights of its runs are not one for each run and input")
+    levels = np.array(rows, dtype=np.intp)
+    weights = np.array(cells, dtype=float).reshape(*chances.shape[:-2], len(rows))
+    counted = np.stack([weights @ (levels == level) for level in range(1, count)], axis=-1)
+    if weights.min() < 0 or np.abs(counted - chances[..., 1:]).max() > 1e-6:
+        raise refuse("its chances are not those of its runs")
+    return Courses(levels, weights)
 
 
 def _tables(path: Path, program: Program, stored: Sequence[Table]) -> tuple[Table, ...]:

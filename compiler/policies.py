@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,18 +18,56 @@ TICKS = 240  # parts of a budget between which shares are decided
 
 
 @dataclass(frozen=True)
+class Within:
+    """When a call that is watched ends, in every state.
+
+    state: as of a choice. ends: [..., M', ⌈L / 8⌉, TICKS + 1] whether at a moment within the budget
+    with a level, a bit for each level.
+    """
+
+    state: tuple[str, ...]
+    ends: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
 class Choice:
     """What one call gets in every state.
 
     state: what the decision looks at, in order: labels of nodes, by their level, and of branches,
-    by what their tests answer. moments: [..., TICKS + 1] the moment at which the call is to end,
-    by the state and the ticks that are left. seconds: [M] of the moments.
+    by what their tests answer. moments: [..., TICKS + 1] the moment at which the call is to end, or
+    where it is watched the last at which it may, by the state and the ticks that are left.
+    seconds: [M] of the moments. within: of a call that is watched.
     """
 
     call: str
     state: tuple[str, ...]
     moments: NDArray[np.int16]
     seconds: Floats
+    within: Within | None = None
+
+
+@dataclass(frozen=True)
+class Share:
+    """What a call gets when it begins.
+
+    seconds: at most. moments: [M'] seconds; ends: [M', L] whether to end at one of them with a
+    level; both empty where the call is not watched. levels: [L]; seen: what estimates stand for.
+    """
+
+    seconds: float
+    moments: Floats = field(default_factory=lambda: np.zeros(0))
+    ends: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
+    levels: Floats = field(default_factory=lambda: np.zeros(0))
+    seen: Seen | None = None
+
+    @property
+    def watched(self) -> bool:
+        """Whether it depends on what the call shows while it runs."""
+        return len(self.moments) > 0
+
+    def level(self, estimate: float) -> int:
+        """The level of a result that shows this."""
+        return nearest(self.levels, estimate, self.seen)
 
 
 @dataclass(frozen=True)
@@ -46,12 +84,13 @@ class Policy:
     """Plans for increasing budgets. A budget between two is spent by the plan of the lower one.
 
     levels: of the nodes that decisions look at, by label. seen: of those with estimates, what
-    quality one stands for.
+    quality one stands for. watched: labels of the calls whose end is decided while they run.
     """
 
     plans: tuple[Plan, ...]
     levels: Mapping[str, Floats]
     seen: Mapping[str, Seen]
+    watched: frozenset[str] = frozenset()
 
     def plan(self, seconds: float) -> Plan | None:
         """The plan for a budget; None below the least one."""
@@ -60,8 +99,8 @@ class Policy:
 
     def share(
         self, program: Program, plan: Plan, call: str, left: float, known: Mapping[str, Known]
-    ) -> float:
-        """Seconds that a call gets when so many are left of the plan's budget.
+    ) -> Share:
+        """What a call gets when so many seconds are left of the plan's budget.
 
         known: results that are there, by label of their node.
         """
@@ -69,7 +108,14 @@ class Policy:
         tick = plan.budget / TICKS
         ticks = min(TICKS, max(0, math.floor(left / tick + 1e-9))) if tick > 0 else 0
         state = tuple(self._level(program, name, known) for name in choice.state)
-        return float(choice.seconds[choice.moments[(*state, ticks)]])
+        seconds = float(choice.seconds[choice.moments[(*state, ticks)]])
+        if choice.within is None:
+            return Share(seconds)
+        levels = self.levels[call]
+        inside = tuple(self._level(program, name, known) for name in choice.within.state)
+        bits = choice.within.ends[(*inside, slice(None), slice(None), ticks)]
+        ends = np.unpackbits(bits, axis=-1, count=len(levels)).astype(np.bool_)
+        return Share(seconds, choice.seconds[: len(ends)], ends, levels, self.seen.get(call))
 
     def _level(self, program: Program, name: str, known: Mapping[str, Known]) -> int:
         if name not in self.levels:
@@ -79,11 +125,18 @@ class Policy:
             given = [known.get(label_of(argument)) for argument in join.arguments]
             return int(join.rule.answer(given) is False)
         result, levels = known.get(name), self.levels[name]
-        if result is None or len(levels) == 1:
+        if result is None:
             return 0
         estimate = 1.0 if result.estimate is None else result.estimate
-        quality = float(np.interp(estimate, *self.seen[name])) if name in self.seen else estimate
-        return 1 + int(np.abs(levels[1:] - quality).argmin())
+        return nearest(levels, estimate, self.seen.get(name))
+
+
+def nearest(levels: Floats, estimate: float, seen: Seen | None) -> int:
+    """The level of a result that shows this; 0 where there are no levels but "no result"."""
+    if len(levels) == 1:
+        return 0
+    quality = estimate if seen is None else float(np.interp(estimate, *seen))
+    return 1 + int(np.abs(levels[1:] - quality).argmin())
 
 
 def label_of(node: object) -> str:

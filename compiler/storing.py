@@ -18,7 +18,7 @@ from compiler.objectives import Objective
 from compiler.policies import Policy
 from compiler.tables import Table
 
-SCHEMA = "anytime.schedule/2"
+SCHEMA = "anytime.schedule/3"
 
 
 class StoredArgument(Stored):
@@ -55,6 +55,13 @@ class StoredParallel(Stored):
     processors: int
 
 
+class StoredCourses(Stored):
+    """Of each run its level at each moment, and how much it counts for each levels of inputs."""
+
+    levels: list[list[int]]
+    weights: list[list[float]]
+
+
 class StoredTable(Stored):
     label: str
     module: str
@@ -64,6 +71,7 @@ class StoredTable(Stored):
     shape: list[int]
     chances: list[float]
     first: float
+    courses: StoredCourses | None = None
 
 
 class StoredSchedule(Stored):
@@ -131,7 +139,11 @@ def save(compiled: Compiled, path: Path) -> None:
             for p in compiled.program.parallels
         ],
         objective=(compiled.objective.kind, compiled.objective.parameter),
-        tables=[_store_table(table) for table in compiled.tables if table.rule is None],
+        tables=[
+            _store_table(table, policy is not None and table.label in policy.watched)
+            for table in compiled.tables
+            if table.rule is None
+        ],
         budgets=frontier.budgets.tolist(),
         shares=frontier.shares.tolist(),
         promised=frontier.promised.tolist(),
@@ -188,7 +200,16 @@ def _store_rule(rule: Rule) -> StoredRule:
             return StoredRule(kind=rule.kind, weights=list(rule.weights), deadlines=deadlines)
 
 
-def _store_table(table: Table) -> StoredTable:
+def _store_table(table: Table, watched: bool) -> StoredTable:
+    """A table, with the runs that it counts where a policy watches them."""
+    courses = None
+    if watched and table.courses is not None:
+        runs = table.courses.levels
+        weights = table.courses.weights.reshape(-1, len(runs))
+        courses = StoredCourses(
+            levels=runs.tolist(),
+            weights=[[float(f"{weight:.9g}") for weight in row] for row in weights],
+        )
     return StoredTable(
         label=table.label,
         module=table.module,
@@ -198,4 +219,5 @@ def _store_table(table: Table) -> StoredTable:
         shape=list(table.chances.shape),
         chances=[float(f"{chance:.9g}") for chance in table.chances.ravel()],
         first=table.first,
+        courses=courses,
     )

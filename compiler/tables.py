@@ -23,6 +23,18 @@ KNOWN = np.array([0.0, 1.0])  # levels of an input that a test is: it is there a
 
 
 @dataclass(frozen=True)
+class Courses:
+    """The recorded runs that a table counts.
+
+    levels: [R, M] output level of each run at each moment. weights: [L_1, …, L_k, R] how much each
+    run counts for input levels, in sum 1, or 0 where an input is missing.
+    """
+
+    levels: NDArray[np.intp]
+    weights: Floats
+
+
+@dataclass(frozen=True)
 class Table:
     """One node: its distribution over output levels for input levels and times.
 
@@ -34,6 +46,7 @@ class Table:
     first: seconds by which half of the runs have a first result.
     path: the arms of branches and parallels that the call stands in, from the outermost in.
     rule: of a join, which takes no time; None for a call.
+    courses: of a call, the runs that `chances` counts, where they are known.
     """
 
     label: str
@@ -45,6 +58,7 @@ class Table:
     first: float
     path: tuple[Arm, ...] = ()
     rule: Rule | None = None
+    courses: Courses | None = None
 
     @property
     def expected(self) -> Floats:
@@ -181,8 +195,12 @@ def _table(
     chances[filled] = known.reshape(*(size - 1 for size in shape), len(times), len(levels))
     # Ta of [ZR93] §2, moved up to one of the moments.
     first = float(times[min(int(np.searchsorted(times, profile.time_to(0.0))), len(times) - 1)])
-    feeds, chances = _once_each(tuple(s.label for s in feeding.values()), chances)
-    return Table(call.label, name, feeds, levels, times, chances, first)
+    counted = np.zeros((*shape, len(profile.recordings)))
+    counted[filled] = weights.reshape(*(size - 1 for size in shape), -1)
+    labels = tuple(s.label for s in feeding.values())
+    feeds, chances = _once_each(labels, chances)
+    courses = Courses(bins, _once_each(labels, counted)[1])
+    return Table(call.label, name, feeds, levels, times, chances, first, courses=courses)
 
 
 def _scale(profile: Profile, counts: Mapping[str, float] | None) -> Floats:

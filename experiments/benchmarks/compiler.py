@@ -17,6 +17,7 @@ from experiments.benchmarks import (
     compiler_constructs,
     compiler_export,
     compiler_interruption,
+    compiler_watching,
 )
 from experiments.benchmarks.compiler_advice import measure_advice, measure_rover
 from experiments.benchmarks.compiler_constructs import KINDS
@@ -78,6 +79,9 @@ def measure(
     figures |= {f"constructs.{kind}": count for kind, count in wrong.items()}
     progress("adaptive schedules on chains with bad luck")
     figures |= compiler_adaptive.measure(3 if quick else 12, seed)
+    inside, below = compiler_watching.measure(2 if quick else 8, seed)
+    figures |= inside
+    figures["adaptive.below_static"] = (figures["adaptive.below_static"] or 0) + below
     for part in (measure_promises, measure_advice, measure_rover):
         figures |= part(quick=quick, seed=seed, progress=progress)
     figures["dag5.mismatches"] = sum(

@@ -148,7 +148,7 @@ def live(
         left, known = plan.budget, dict[str, Known]()
         level: Mapping[str, int] = {}
         for table in tables:
-            share = policy.share(program, plan, table.label, left, known)
+            share = policy.share(program, plan, table.label, left, known).seconds
             moment = int(np.searchsorted(table.times, share + 1e-9, side="right")) - 1
             cell = tuple(level[feed] for feed in table.feeds)
             reached = int(rng.choice(len(table.levels), p=table.chances[(*cell, moment)]))

@@ -177,10 +177,17 @@ def test_each_objective_divides_best_for_itself(library, objective, tmp_path):
     assert again.objective == objective
 
 
+def test_the_expected_quality_is_the_default_however_it_is_said(library):
+    said = compiler.compile(chance, library, objective=compiler.expected())
+    usual = compiler.compile(chance, library)
+    assert [said.promise(t) for t in (0.05, 0.1)] == [usual.promise(t) for t in (0.05, 0.1)]
+
+
 def test_with_a_cost_of_time_a_program_ends_early(library):
     costly = compiler.compile(chance, library, objective=compiler.expected(lambda q, t: q - 3 * t))
     result = costly.run(5.0, clock=clock(), luck=0.9)
     assert 0 < result.elapsed < 0.2
+    assert all(price.gain < 0.05 for price in costly.explain(0.2).prices)  # in utility
     with pytest.raises(AnytimeError, match="compiled for a utility, a function"):
         costly.save("nowhere.schedule")
 
