@@ -29,6 +29,7 @@ MODULE = {
     "nothing": "it completes without a result",
     "rubbish": "a text in place of its result",
     "wrong-quality": "it estimates NaN",
+    "lies": "it estimates 1, whatever its result",
     "slow": "it works ten times as much for each result",
     "floods": "a million check-points for nothing",
     "mutates": "it overwrites the arrays that it is given",
@@ -160,6 +161,8 @@ def faulty_module(module: Module, schedule: Schedule, now: Callable[[], float]) 
     def estimate(value: Any) -> float:
         if "wrong-quality" in begun:
             return math.nan
+        if "lies" in begun:
+            return 1.0
         return 0.0 if plain is None or isinstance(value, str) else plain(value)
 
     return replace(

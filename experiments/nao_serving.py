@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import subprocess
 import sys
 import threading
@@ -69,6 +70,7 @@ class FaultProxy:
 
     def __init__(self, port: int) -> None:
         self.delay = 0.0  # seconds that everything takes on its way
+        self.garbled = False  # from now on other bytes arrive than were sent
         self._target = port
         self._writers: list[asyncio.StreamWriter] = []
         self._loop = asyncio.new_event_loop()
@@ -124,7 +126,7 @@ class FaultProxy:
             while data := await reader.read(65536):
                 await asyncio.sleep(self.delay)
                 await self._open.wait()
-                writer.write(data)
+                writer.write(os.urandom(len(data)) if self.garbled else data)
                 await writer.drain()
         finally:
             writer.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import resource
 import time
@@ -17,7 +18,14 @@ from anytime.faults import Fault, FaultyClock, Schedule
 from anytime.workers import workers
 from compiler import CompiledProgram
 from experiments import crossings
-from experiments.benchmarks import faulty_missions, kills, malformed
+from experiments.benchmarks import (
+    faulty_missions,
+    kills,
+    link_faults,
+    malformed,
+    mutation,
+    soak,
+)
 from experiments.benchmarks.deadline import CONTRACT, overrun_of_nothing, warm_up
 from experiments.benchmarks.figures import Benchmark, share_interval
 from experiments.benchmarks.misbehaving import MISBEHAVING
@@ -30,16 +38,11 @@ from monitor.robots.grid_missions import REFERENCE
 from sensing.vision import Vision
 
 BOUND = 250.0  # ms past its contract in which control is back, whatever an isolated module does
+HOUR = 3600.0  # seconds of a soak, and of mutation, with --full
+HALT = 1.0  # seconds after the last sign of life in which a robot stands
 LOUD = 100.0  # ms that an empty loop runs over, above which a trial is repeated
 RUBBISH = (("rubbish", 0.1), ("nothing", 0.1), ("raises", 0.1))
 """What planners return instead of a plan, and how often: three times in ten together."""
-
-_NOT_MEASURED = {
-    "halt.worst_s": "the halt after a lost link is measured by bench nao (faults.handled)",
-    "soak.mb_per_hour": "an hour; run by name",
-    "soak.missions": "an hour; run by name",
-    "mutation.killed": "run by name",
-}
 
 
 def measure(
@@ -50,12 +53,13 @@ def measure(
     maps: Path | None = None,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Benchmark:
-    """Misbehaving modules, faulty missions, killed writers, failing disks, malformed files."""
-    trials, lived, floors, killed, files = (
-        (60, 200, 60, 5, 1000) if quick else (1000, 2000, 500, 200, 10_000)
+    """Misbehaving modules, faulty missions, killed writers, failing disks, malformed files, failing
+    links, a soak; with `full` an hour of it, and how many changed programs the tests notice."""
+    trials, lived, floors, killed, files, links = (
+        (60, 200, 60, 5, 1000, 36) if quick else (1000, 2000, 500, 200, 10_000, 500)
     )
-    settings: dict[str, Any] = {"not_measured": dict(_NOT_MEASURED)}
-    figures: dict[str, float | int | None] = dict.fromkeys(_NOT_MEASURED)
+    settings: dict[str, Any] = {"not_measured": {}}
+    figures: dict[str, float | int | None] = {}
     program = crossings.compiled()
     progress(f"malformed: {files} files")
     figures |= _malformed(files, seed, settings)
@@ -71,6 +75,13 @@ def measure(
     figures["kills.count"] = len(outcomes)
     progress(f"return_bound: {trials} trials of {len(MISBEHAVING)} misbehaving modules")
     figures |= _return_bound(trials, settings)
+    progress(f"halt: {links} faults of links to a walking robot")
+    figures |= _halt(links, seed, settings)
+    long = HOUR if full else 20.0 if quick else 120.0
+    progress(f"soak: {long:.0f} s of missions in a process of their own")
+    figures |= _soak(long, seed, settings)
+    progress("mutation: programs with one thing changed, for --full alone")
+    figures |= _mutation(full, seed, settings)
     return Benchmark("faults", figures, settings, seed)
 
 
@@ -175,6 +186,63 @@ def _return_bound(trials: int, settings: dict[str, Any]) -> dict[str, float | in
         "return_bound.repeated": repeated,
         "return_bound.count": len(over),
     }
+
+
+def _halt(count: int, seed: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+    """How old the last sign of life of its commander was when a robot still walked."""
+    if importlib.util.find_spec("qi") is None:
+        settings["not_measured"]["halt.worst_s"] = "libqi is not installed: extra nao"
+        return {"halt.worst_s": None}
+    seen = list(link_faults.trials(count, seed))
+    walked = [each for each in seen if each.moved]
+    kinds = sorted({each.kind for each in seen})
+    settings["halt.worst_s"] = {
+        kind: max(each.halt for each in seen if each.kind == kind) for kind in kinds
+    }
+    told = [each.told for each in seen if each.kind in link_faults.TOLD]
+    return {
+        "halt.worst_s": max(each.halt for each in seen),
+        "halt.within_1_s": float(np.mean([each.halt <= HALT for each in walked])),
+        "halt.count": len(walked),
+        "halt.commands_after_stop": sum(each.after for each in seen),
+        "halt.unwatched_motions": sum(each.unwatched for each in seen),
+        "halt.told_worst_s": max(told),
+    }
+
+
+def _soak(seconds: float, seed: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+    """What a process does not give back that lives mission after mission."""
+    if not os.path.isdir("/proc/self/fd"):
+        settings["not_measured"]["soak.mb_per_hour"] = "what a process holds is told by Linux"
+        return {"soak.mb_per_hour": None, "soak.missions": None}
+    found = soak.soaked(seconds, seed)
+    settled = found.settled()
+    mean, low, high = found.mb_per_hour()
+    files, children = found.grown()
+    settings["soak.seconds"] = seconds
+    return {
+        "soak.missions": found.missions,
+        "soak.mb_per_hour": mean,
+        "soak.mb_per_hour_low": low,
+        "soak.mb_per_hour_high": high,
+        "soak.mb": float(settled[-1, 1]),
+        "soak.mb_grown": float(settled[-1, 1] - settled[0, 1]),
+        "soak.file_descriptors_grown": files,
+        "soak.children_grown": children,
+        "soak.exceptions": found.raised,
+    }
+
+
+def _mutation(full: bool, seed: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+    """The share of changed programs that the tests notice."""
+    if not full or not mutation.available():
+        reason = "part of --full, or python -m experiments.benchmarks.mutation, beside the tests"
+        settings["not_measured"]["mutation.killed"] = reason
+        return {"mutation.killed": None}
+    found = list(mutation.tried(HOUR, seed, list(mutation.TARGETS), lambda message: None))
+    settings["mutation.survivors"] = [str(each) for each in found if not each.killed]
+    shares = share_interval("mutation.killed", [each.killed for each in found])
+    return {**shares, "mutation.count": len(found)}
 
 
 def _in_turn() -> Iterator[anytime.Module]:

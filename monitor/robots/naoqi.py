@@ -16,6 +16,7 @@ from monitor.robots.naoqi_actions import Call, NaoqiAction, Piece, Way
 from monitor.robots.naoqi_link import Link, RemoteError
 from monitor.robots.naoqi_lockstep import Lockstep
 from monitor.robots.naoqi_looks import Look, Looks
+from monitor.robots.naoqi_watch import Heart
 from planners.nao import POSTURES, STANDING, Body
 
 _FARTHEST = 100.0  # metres or radians that one walk may go
@@ -62,6 +63,7 @@ class NaoqiBody:
         self.link = Link(url, timeout, user)
         self.odometry = Odometry(self.body.speed, self.body.turn_rate)
         self._looks = Looks(self.link, self.odometry)
+        self._heart = Heart(self.link)
         self._auto_stand, self._closed = auto_stand, False
         self._action: NaoqiAction | None = None
         self._probe: tuple[float, float, bool, list[Any]] | None = None
@@ -144,6 +146,7 @@ class NaoqiBody:
     def close(self) -> None:
         self.stop()
         self._closed = True
+        self._heart.close()
         self.link.close("ALSonar", "unsubscribe", _NAME)
 
     def attend(self) -> None:
@@ -253,6 +256,7 @@ class NaoqiBody:
         if before is not None and (before.way is None) != (action.way is None):
             self._halt()
         self._end(Outcome.CANCELLED)
+        self._heart.start()
         action.deadline = self.now() + 5.0 + 2.0 * seconds
         self._action = action
         return action
@@ -267,6 +271,7 @@ class NaoqiBody:
         action, self._action, self._probe = self._action, None, None
         if action is not None:
             action.outcome = outcome
+            self._heart.rest(leave=outcome is not Outcome.LINK_LOST)
 
     def _ready(self) -> Look:
         """What a command is decided by. Raises LinkLostError."""

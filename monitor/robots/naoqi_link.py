@@ -17,7 +17,7 @@ PASSWORD = "NAO_PASSWORD"
 """The environment variable that holds the robot's password, or NAO_PASSWORD_FILE its file."""
 
 _NEEDED = ("ALMotion", "ALRobotPosture", "ALMemory")
-_OPTIONAL = ("ALSonar", "SimClock")
+_OPTIONAL = ("ALSonar", "SimClock", "Watch")
 _LOST = (
     "Future timeout",
     "Session closed",
@@ -107,6 +107,10 @@ class Link:
     def has(self, service: str) -> bool:
         """Whether the robot has a service."""
         return service in self._services
+
+    def service(self, name: str) -> Any:
+        """A service of this connection, as libqi has it."""
+        return self._services[name]
 
     def connect(self) -> None:
         """Connect anew. Raises LinkLostError if that fails, or if it is too early to try again."""

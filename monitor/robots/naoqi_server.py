@@ -21,6 +21,15 @@ from monitor.robots.naoqi_names import NO_ECHO, SONARS
 from monitor.robots.naoqi_stage import Stage
 from planners.nao import POSTURES
 
+_AT_ONCE = 60.0  # seconds that lock-step lives in one call: meanwhile nobody is answered
+
+
+def _numbers(call: str, *values: Any) -> None:
+    """Raises what the caller is told if one is no finite number: anybody may send anything."""
+    for value in values:
+        if not isinstance(value, float | int) or not math.isfinite(value):
+            raise RuntimeError(f"{call}: needs finite numbers, not {str(value)[:40]!r}")
+
 
 class Motion:
     """ALMotion: walking. Metres, radians, in the robot's frame."""
@@ -29,6 +38,7 @@ class Motion:
         self._stage = stage
 
     def moveTo(self, x: float, y: float, theta: float) -> Any:  # noqa: N802
+        _numbers("ALMotion::moveTo", x, y, theta)
         return self._stage.command("walk", lambda body: body.walk(x, y, theta))
 
     def stopMove(self) -> None:  # noqa: N802
@@ -143,6 +153,7 @@ class SimClock:
         """Lock-step: let the scene start anew at a time, of that seed if it is one."""
         if self._stage.rate is not None:
             raise RuntimeError("SimClock.begin: only a server with --lockstep can begin anew")
+        _numbers("SimClock.begin", start, *(() if seed is None else (seed,)))
         self._stage.begin(start, seed)
         self._stage.begun = True
 
@@ -154,6 +165,9 @@ class SimClock:
         """Lock-step: live up to a time, after so many commands; time and number of what runs."""
         if self._stage.rate is not None:
             raise RuntimeError("SimClock.settle: only a server with --lockstep is told the time")
+        _numbers("SimClock.settle", now, commands)
+        if now - self._stage.clock.now() > _AT_ONCE:
+            raise RuntimeError(f"SimClock.settle: at most {_AT_ONCE:g} s at once")
         return list(self._stage.settle(now, commands))
 
     def truth(self) -> list[float]:
@@ -161,6 +175,28 @@ class SimClock:
         with self._stage.lock:
             robot = self._stage.simulated
             return [*robot.true_pose_in_world, float(robot.falls), float(robot.world.contacts)]
+
+
+class Watching:
+    """The service that a robot needs for a halt within a second: see `naoqi_watch.Watch`."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+
+    def beat(self, echo: float) -> float:
+        _numbers("Watch.beat", echo)
+        with self._stage.lock:
+            return self._stage.watch.beat(echo)
+
+    def leave(self, echo: float) -> None:
+        _numbers("Watch.leave", echo)
+        with self._stage.lock:
+            if not self._stage.running():  # who lost the link believes that all is over
+                self._stage.watch.leave(echo)
+
+    def heard(self) -> float:
+        """When somebody was last surely alive, on the server's `time.perf_counter`."""
+        return self._stage.watch.heard
 
 
 def serve(
@@ -187,7 +223,10 @@ def serve(
             f"nobody can be served at port {port} of 127.0.0.1; give one that is free, or 0"
         ) from None
     kinds = {"ALMotion": Motion, "ALRobotPosture": Postures, "ALMemory": Memory}
-    for name, kind in (kinds | {"ALSonar": Listening, "SimClock": SimClock}).items():
+    kinds |= {"ALSonar": Listening, "SimClock": SimClock}
+    if rate is not None:  # in lock-step nothing moves when nobody is heard
+        kinds["Watch"] = Watching
+    for name, kind in kinds.items():
         session.registerService(name, kind(stage))
     try:
         ready(session.endpoints()[0])

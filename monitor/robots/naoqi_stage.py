@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any
@@ -14,6 +15,7 @@ from monitor.robots.nao_faults import Fault, Faulty
 from monitor.robots.nao_scenes import Scene
 from monitor.robots.naoqi_link import libqi
 from monitor.robots.naoqi_names import FALLEN
+from monitor.robots.naoqi_watch import LIMIT, Watch
 from monitor.robots.simulated_nao import SimulatedNao
 
 _POSTURE = "PostureChanged"
@@ -30,6 +32,7 @@ class Stage:
         self.begun = False
         self.listened = False  # whether somebody subscribed to the sonars
         self.awake = True
+        self.watch = Watch(time.perf_counter)
         self.lock = threading.Condition()
         self.memory: dict[str, Any] = {FALLEN: 0.0, _POSTURE: scene.posture, _FAILED: []}
         self.subscribers: dict[str, Any] = {}
@@ -53,6 +56,8 @@ class Stage:
         """Tell the body something; the future of whether it was done."""
         with self.lock:
             self.live()
+            if self.watch.silent:  # it was on its way for too long, like its sender's last beat
+                raise RuntimeError(f"nobody was heard for {LIMIT} s; beat Watch first")
             self.commands += 1
             promise = self.qi.Promise()
             if self.awake:
@@ -74,6 +79,8 @@ class Stage:
     def live(self) -> Reading:
         """Live up to now: raise what there is to raise, answer the calls that came to their end."""
         with self.lock:
+            if self.watch.silent and any(kind == "walk" for _, kind, _, _ in self._waiting):
+                self.body.stop()
             reading = self.body.read()
             if reading.fallen and not self.memory[FALLEN]:
                 self.awake = False

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 import anytime
-from anytime import AnytimeError, Machine, WorkClock, executors
+from anytime import AnytimeError, Machine, WorkClock, campaigns, executors
 from anytime.programs import program_of
 
 MACHINE = Machine("test").with_rate("climb", 0.01).with_rate("fragile", 0.01)
@@ -36,6 +37,8 @@ def climb(start, trap, *, rng):
 def fragile(how):
     if how == "raises":
         raise ValueError("two\nlines")
+    if how == "hangs":
+        threading.Event().wait()
     if how == "kills":
         os.kill(os.getpid(), signal.SIGKILL)
     for value in 0.2, 0.4, 0.6:
@@ -155,6 +158,14 @@ def test_a_run_that_kills_its_workers_is_left_out_and_the_others_stand(tmp_path)
     assert len(library["fragile"].problems) == 10
     with pytest.warns(UserWarning, match="5 kills is left out"):  # and not tried again
         anytime.measure(fragile, asked, seconds=1.0, clock=CLOCK, store=store)
+
+
+def test_a_run_that_hangs_is_ended_and_left_out_and_the_others_stand(monkeypatch):
+    monkeypatch.setattr(campaigns, "PATIENCE", 0.2)
+    asked = fragiles("works", "hangs", "works")
+    with pytest.warns(UserWarning, match="1 hangs is left out: its worker died 2 times"):
+        library = anytime.measure(fragile, asked, seconds=0.05, clock=CLOCK, executor="processes:1")
+    assert library["fragile"].problems == ("0 works", "2 works")
 
 
 def test_when_all_fail_the_campaign_ends_early_with_the_reason():

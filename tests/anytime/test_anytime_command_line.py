@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
-from anytime import AnytimeError
+from anytime import AnytimeError, commands
 from anytime.__main__ import main
 from anytime.command_line import folder, natural, resolve, target
 
@@ -97,3 +98,16 @@ def test_every_profile_of_a_folder_is_drawn(tmp_path, capsys):
     capsys.readouterr()
     assert main(["plot", str(kept), "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out.split() == [str(tmp_path / "guess.profile.png")]
+
+
+def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys):
+    def broken(options):
+        raise ZeroDivisionError("of ours")
+
+    monkeypatch.setattr(commands, "doctor", broken)
+    assert main(["doctor"]) == 70
+    told = capsys.readouterr().err
+    assert len(told.splitlines()) == 1
+    report = Path(told.split("report: ")[1].strip())
+    assert "ZeroDivisionError: of ours" in report.read_text()
+    report.unlink()

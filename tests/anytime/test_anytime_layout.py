@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import zipfile
@@ -74,6 +75,18 @@ def test_imports_point_down():
     )
     assert ran.returncode == 0, ran.stdout
     assert "0 broken" in ran.stdout
+
+
+def test_nothing_asks_for_the_time_of_day():
+    """It jumps: by a day when a robot finds the network. `perf_counter` and `monotonic` do not."""
+    told = re.compile(r"\b(time\.time(_ns)?|(datetime|date)\.(now|utcnow|today))\b")
+    asked = [
+        f"{file.relative_to(ROOT)}: {found[0]}"
+        for package in PACKAGES
+        for file in (ROOT / package).rglob("*.py")
+        if (found := told.search(file.read_text(encoding="utf-8")))
+    ]
+    assert asked == []
 
 
 @pytest.fixture(scope="module")

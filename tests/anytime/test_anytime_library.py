@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +137,44 @@ def test_writing_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypat
                 write_atomically(path, b"new")
         assert path.read_bytes() == b"old"
         assert [p.name for p in tmp_path.iterdir()] == ["a.profile"]
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from anytime.library import write_machine
+from anytime.machines import Machine
+path, who = Path(sys.argv[1]), sys.argv[2]
+for done in range(60):
+    write_machine(path, Machine(who).with_rate(who, 1.0 + done))
+"""
+
+
+def test_of_several_writers_of_one_file_one_wins_whole(tmp_path):
+    path, names = tmp_path / "machine.json", ("one", "other", "third")
+    writers = [subprocess.Popen([sys.executable, "-c", WRITER, str(path), name]) for name in names]
+    seen = set()
+    while any(writer.poll() is None for writer in writers):
+        if path.exists():
+            machine = read_machine(path)
+            assert list(machine.rates) == [machine.name], "a mixture of two writers"
+            seen.add(machine.name)
+    assert all(writer.returncode == 0 for writer in writers)
+    assert seen <= set(names)
+    assert read_machine(path).rates[read_machine(path).name].per_work == 60.0
+    assert [file.name for file in tmp_path.iterdir()] == ["machine.json"]
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="a folder that nobody can write to")
+def test_where_nothing_can_be_written_the_command_says_so_in_one_line(tmp_path, capsys):
+    from anytime.__main__ import main
+
+    ProfileLibrary(profiles={"find": small()}).save(tmp_path)
+    nowhere = "/proc/self/task"
+    assert main(["plot", str(tmp_path / "find.profile"), "-o", nowhere]) == 2
+    told = capsys.readouterr().err
+    assert len(told.splitlines()) == 1
+    assert nowhere in told
 
 
 def test_a_number_that_is_not_finite_is_never_written(tmp_path):

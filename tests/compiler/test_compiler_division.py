@@ -92,6 +92,20 @@ def test_a_result_of_quality_zero_is_not_mistaken_for_no_result():
     assert divide(tables).promise(3.0) == 0.9
 
 
+@given(
+    st.builds(chancy, st.sampled_from([SHAPES["three"], SHAPES["shared"]]), st.integers(0, 2**32))
+)
+@settings(max_examples=12)
+def test_what_is_called_exact_is_beaten_by_no_division(tables):
+    frontier = divide(tables)
+    assert frontier.exact
+    assert (np.diff(frontier.budgets) > 0).all()
+    assert (np.diff(frontier.promised) > 0).all()
+    for moments in itertools.product(*(range(len(table.times)) for table in tables)):
+        spent = sum(t.times[m] for t, m in zip(tables, moments, strict=True))
+        assert frontier.promise(spent) >= expected_quality(tables, moments) - 1e-8
+
+
 @given(st.builds(chancy, st.sampled_from([SHAPES["one"], SHAPES["chain"]]), st.integers(0, 2**32)))
 def test_one_and_two_calls_are_divided_optimally_over_distributions(tables):
     frontier = divide(tables)

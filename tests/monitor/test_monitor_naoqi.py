@@ -7,17 +7,19 @@ import contextlib
 import math
 import queue
 import signal
+import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, WallClock, WorkClock
 from anytime.machines import Machine
-from experiments.benchmarks import nao_failures
+from experiments.benchmarks import link_faults, nao_failures
 from experiments.benchmarks.nao_failures import COLLIDING, FAILURES, FREE, Rig, identical, observed
 from monitor.robots import naoqi_link
 from monitor.robots.nao_addresses import nao_body
@@ -32,7 +34,8 @@ from monitor.robots.naoqi import NaoqiBody
 from monitor.robots.naoqi_actions import Way
 from monitor.robots.naoqi_link import AuthenticatorFactory, password
 from monitor.robots.naoqi_names import FALLEN, NO_ECHO, SONARS
-from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock
+from monitor.robots.naoqi_server import Listening, Memory, Motion, Postures, SimClock, Watching
+from monitor.robots.naoqi_watch import LIMIT, Watch
 from monitor.robots.simulated_nao import SimulatedNao
 
 STANDS = Scene(posture="Stand", noise=NOISELESS)
@@ -228,6 +231,73 @@ def test_what_goes_wrong_ends_as_it_should(rig, name):
     assert FAILURES[name](rig)
 
 
+@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="who listens is told by Linux")
+def test_the_server_listens_on_loopback_alone(rig):
+    port = f":{rig.live().port:04X}"
+    tables = [Path(f"/proc/net/{name}") for name in ("tcp", "tcp6")]
+    lines = [line.split() for table in tables if table.exists() for line in table.open()]
+    listens = [line[1] for line in lines if line[3] == "0A" and line[1].endswith(port)]
+    assert listens == [f"0100007F{port}"]
+
+
+ILL_TYPED = [
+    ("ALMotion", "moveTo", ("far", {}, [])),
+    ("ALMotion", "moveTo", (math.nan, 0.0, 0.0)),
+    ("ALMotion", "moveTo", (0.0, math.inf, 0.0)),
+    ("ALMotion", "moveTo", (None, None, None)),
+    ("ALMotion", "moveTo", (1e9, 0.0, 0.0)),
+    ("ALMotion", "moveTo", (1.0, 2.0)),
+    ("ALMotion", "fly", (1.0,)),
+    ("ALRobotPosture", "goToPosture", (["Sit"], {})),
+    ("ALRobotPosture", "goToPosture", ("Fly", 1.0)),
+    ("SimClock", "begin", ("a", None)),
+    ("SimClock", "begin", (math.nan, None)),
+    ("SimClock", "settle", ({}, "a")),
+    ("SimClock", "settle", (1e300, 0)),
+]
+
+
+def test_calls_that_make_no_sense_move_nothing_and_disturb_nobody(rig):
+    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as nao:
+        before = nao.read()
+        for service, method, arguments in ILL_TYPED:
+            told = ""
+            try:
+                assert nao.link.call(service, method, *arguments) is False, (method, arguments)
+            except AnytimeError as error:
+                told = str(error)
+            assert str(Path(__file__).parents[2]) not in told, "no paths of ours"
+            assert "Traceback" not in told
+        assert nao.read() == before
+        nao.wait(1.0)
+        assert nao.read().pose_in_world == before.pose_in_world
+
+
+def test_connections_that_speak_nonsense_harm_nobody(rig):
+    magic = bytes.fromhex("42dead42")
+    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as nao:
+        before, port, held = nao.read(), rig.crowded().port, []
+        for number in range(120):
+            nonsense = [
+                np.random.default_rng(number).bytes(100),
+                magic + number.to_bytes(4, "little") + b"\xff" * 40,  # 4 GiB are announced
+                magic[:3],  # and the rest never comes
+                b"",
+            ][number % 4]
+            connection = socket.create_connection(("127.0.0.1", port))
+            with contextlib.suppress(OSError):  # it may hang up before all is said
+                connection.sendall(nonsense)
+            if number % 4 == 2:
+                held.append(connection)
+            else:
+                connection.close()
+        assert nao.read() == before
+        with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as other:
+            assert ended(other, other.walk(0.1, 0.0, 0.0)) is Outcome.DONE
+        for connection in held:
+            connection.close()
+
+
 def test_a_server_ends_on_ctrl_c(rig):
     server = rig.keep(nao_failures.ServedNao("--lockstep"))
     server.process.send_signal(signal.SIGINT)
@@ -288,6 +358,56 @@ def test_what_is_left_of_a_walk_is_all_of_it_at_its_start_and_nothing_at_its_end
         assert way.rest(start) == pytest.approx((x, y, turn), abs=1e-6)
         end = compose(start, (x, y, turn))
         assert way.rest(end) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+
+
+# The watch
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.0, 0.4), st.floats(0.0, 2.0), st.floats(0.0, 2.0)), max_size=30),
+    st.floats(0.0, 3.0),
+)
+def test_a_robot_that_may_walk_has_heard_of_somebody_who_lived_within_the_limit(beats, later):
+    """Each beat is sent so long after the answer, and beat and answer take so long on their way."""
+    now = sent = 1.0
+    watch = Watch(lambda: now)
+    echo = 0.0
+    for pause, there, back in beats:
+        sent = now + pause
+        now = sent + there
+        echo = watch.beat(echo)
+        assert watch.silent or math.isnan(watch.heard) or now - sent <= LIMIT
+        now += back
+    now += later
+    assert watch.silent or math.isnan(watch.heard) or now - sent <= LIMIT
+
+
+def test_who_takes_leave_is_waited_for_no_more_and_who_overtook_it_is():
+    now = 1.0
+    watch = Watch(lambda: now)
+    first = watch.beat(0.0)
+    now = 1.1
+    second = watch.beat(first)
+    watch.leave(first)
+    assert math.isnan(watch.heard)
+    watch.beat(first)
+    assert math.isnan(watch.heard), "a beat that was on its way"
+    now = 1.2
+    watch.beat(second)
+    watch.leave(first)
+    assert watch.heard == second, "a leave that was on its way"
+    now = 9.0
+    assert watch.silent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", range(len(link_faults.KINDS)))
+def test_whatever_happens_to_the_link_the_robot_stands_within_a_second(rig, kind):
+    with contextlib.closing(link_faults.Lane(rig.floor)) as lane:
+        seen = link_faults.trial(lane, kind, 0)
+    assert seen.moved
+    assert seen.halt <= 1.0
+    assert seen.after == seen.unwatched == 0
 
 
 # Faults
@@ -430,7 +550,7 @@ def test_what_is_no_recording_is_refused_and_a_torn_end_is_not(tmp_path):
 
 def test_the_page_lists_what_is_served_and_what_can_go_wrong():
     page = (Path(__file__).parents[2] / "docs" / "nao.md").read_text(encoding="utf-8")
-    for service in (Motion, Postures, Memory, Listening, SimClock):
+    for service in (Motion, Postures, Memory, Listening, SimClock, Watching):
         for method in vars(service):
             assert method.startswith("_") or f"`{method}(" in page, method
     assert all(f"`{kind}`" in page for kind in KINDS)

@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 
 from monitor import Decision, Energy, Mission, Situation, State, Value
 from monitor.calibration import spread_of
-from monitor.inter_frame import Contracts, Spread, best_contract, foresee
+from monitor.inter_frame import (
+    Contracts,
+    Spread,
+    best_contract,
+    compiled_contracts,
+    foresee,
+    pinned_contracts,
+)
 from monitor.intra_frame import keep_course
 from monitor.policies import Expected, Informed, Paper, constant
 from monitor.rhythms import Lived, Rhythm, rhythm_of
@@ -60,6 +67,59 @@ def test_the_decision_is_the_best_of_all_contracts_and_speeds():
     assert decision.why.net == pytest.approx(max(net for _, net in decision.why.curve))
 
 
+@given(
+    st.sampled_from([0.0, 1.0, 30.0, 200.0]),
+    st.floats(0.0, 30.0),
+    st.sampled_from([0, 1, 2]),
+    st.floats(1.0, 9.0),
+)
+def test_what_is_foreseen_is_thinking_or_driving_whichever_is_longer_frame_by_frame(
+    to_go, in_hand, row, speed
+):
+    mission = replace(MISSION, job=3.0, energy=replace(MISSION.energy, idle=0.05))
+    contracts = replace(CONTRACTS, efficiency=np.array([0.5, 0.8, 0.9]))
+    asked = state(to_go=to_go, in_hand=in_hand)
+    seconds, energy = foresee(mission, contracts, RHYTHM, asked, np.array([speed]))
+    sensing, contract = contracts.shares[row, 0], contracts.shares[row].sum()
+    often, far, stops = (float(each[0]) for each in RHYTHM.at(np.array([sensing])))
+    frames, drive = often * to_go, far / contracts.efficiency[row] / speed
+    walk = RHYTHM.stretched(in_hand, asked.made_on) / speed
+    lasts = max(contract, walk) if to_go > 0 else walk  # the first plan is made meanwhile
+    if frames > 1:
+        lasts += (frames - 1) * max(contract, drive)  # the next plan is made meanwhile
+    lasts += min(frames, 1.0) * drive  # after the last there is none to make
+    lasts += frames * stops * contract + mission.job
+    moves = walk + frames * drive
+    assert seconds[row, 0] == pytest.approx(lasts)
+    idle = mission.energy.idle * (lasts - moves)
+    assert energy[row, 0] == pytest.approx(moves * mission.energy.power(speed) + idle)
+
+
+def test_what_a_contract_makes_of_its_plans_is_a_share_that_more_time_never_lessens():
+    from experiments import crossings
+
+    contracts = compiled_contracts(crossings.compiled())
+    assert ((contracts.efficiency >= 0.05) & (contracts.efficiency <= 1.0)).all()
+    assert contracts.efficiency[0] < 0.9
+    assert contracts.efficiency[-1] == contracts.efficiency.max()
+    assert (contracts.probes >= contracts.efficiency[:, None] - 0.05).all()
+
+
+def test_pinned_contracts_sense_as_little_or_as_long_as_is_of_use_and_plan_as_they_like():
+    from experiments import crossings
+
+    program = crossings.compiled()
+    least, most = (pinned_contracts(program, extreme) for extreme in ("min", "max"))
+    assert set(least.shares[:, 0]) == {program.tables[0].first}
+    assert set(most.shares[:, 0]) == {program.tables[0].saturation}
+    for contracts in (least, most):
+        planning = contracts.shares[:, 1]
+        assert (np.diff(planning) > 0).all()
+        assert planning[0] > 0
+        assert planning[-1] <= program.tables[1].times[-1]
+        assert len(planning) > 5
+
+
 def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
     slow = replace(MISSION, speeds=(1.0, 1.0))
     prices = best_contract(slow, CONTRACTS, RHYTHM, Spread(), state()).why.prices
@@ -93,6 +153,36 @@ def test_the_four_cases_of_the_paper(seen, in_hand, case):
     decided = keep_course(MISSION, now)
     assert decided.why.case == case
     assert np.sign(decided.speed - 4.0) == {"faster": 1, "slower": -1, "keep course": 0}[case]
+
+
+def on_course(contract=4.0, late=0.0, **seen):
+    """Half of a contract has gone; execution ends late by this share of it."""
+    decision = Decision({"see": contract / 2, "plan": contract / 2}, 4.0)
+    in_hand = 4.0 * (contract / 2 + contract * late)
+    return state(contract / 2, in_hand=in_hand, moment="call", contract=decision, **seen)
+
+
+@given(st.floats(0.1, 1.0), st.floats(0.1, 1.0), st.sampled_from([0.25, 1.0, 4.0]))
+def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation, contract):
+    mission = replace(MISSION, gain=gain, speeds=(0.1, 100.0))
+    behind = on_course(contract, deviation, advertised=0.5, seen=0.9)
+    assert keep_course(mission, behind).speed == pytest.approx(4.0 * (1 + gain * deviation))
+    early = deviation / 2  # nobody can be ahead by more than the half that is left
+    ahead = on_course(contract, -early, advertised=0.5, seen=0.1)
+    assert keep_course(mission, ahead).speed == pytest.approx(4.0 * (1 - gain * early))
+
+
+def test_who_is_neither_ahead_nor_behind_keeps_course():
+    for seen in (0.1, 0.5, 0.9):
+        assert keep_course(MISSION, on_course(advertised=0.5, seen=seen)).why.case == "keep course"
+    as_advertised = on_course(late=0.5, advertised=0.5, seen=0.5)
+    assert keep_course(MISSION, as_advertised).why.case == "faster"
+
+
+@pytest.mark.parametrize("seen", [{"advertised": 0.5}, {"seen": 0.9}, {}])
+def test_where_nothing_was_advertised_or_seen_the_contract_stands(seen):
+    asked = on_course(late=1.0, **seen)
+    assert keep_course(MISSION, asked) is asked.contract
 
 
 def test_the_gain_is_a_parameter_of_the_mission():

@@ -74,6 +74,19 @@ def test_the_last_plan_is_the_shortest_or_says_that_there_is_none(floor, connect
     assert last.estimate == 1.0
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (1, 9), (9, 1), (2, 2), (3, 5), (17, 31)])
+def test_floors_of_odd_shapes_are_planned_on_be_they_free_or_blocked(shape):
+    far = (shape[0] - 1, shape[1] - 1)
+    last = plans_of(steps(Grid.known(np.ones(shape, bool)), (0, 0), far))[-1]
+    diagonal, straight = min(far), max(far) - min(far)
+    assert last.length == pytest.approx(math.sqrt(2) * diagonal + straight, rel=1e-4)
+    blocked = np.zeros(shape, bool)
+    blocked[0, 0] = blocked[far] = True
+    last = plans_of(steps(Grid.known(blocked), (0, 0), far))[-1]
+    near = max(far) <= 1 and min(far) == 0
+    assert math.isfinite(last.length) == near
+
+
 @given(floors(), st.sampled_from([4, 8]))
 @settings(max_examples=80)
 def test_every_plan_from_cell_to_cell_is_a_way_and_shorter_than_the_one_before(floor, connectivity):
