@@ -95,7 +95,6 @@ def test_a_task_is_lived_as_decided_and_the_paper_steers_by_its_four_cases(monke
     report, seen = tasks.lived(0, PAPER)
     assert report
     assert len(seen) > 0
-    monkeypatch.setattr(tasks, "TASKS", 2)
     assert tasks.ahead_behind(0, PAPER)
     gap, same = tasks.within_4(0, PAPER)
     assert gap == same == 1.0 - report.net / report.promised
