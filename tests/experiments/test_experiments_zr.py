@@ -89,9 +89,7 @@ def test_the_compiled_profile_is_ordered_and_above_min_and_max():
     assert (found.divided() >= np.maximum(*found.pinned()) - dividing.CLOSE).all()
 
 
-def test_a_task_is_lived_as_decided_and_the_paper_steers_by_its_four_cases(monkeypatch):
-    for name, value in (("_LEVELS", 2), ("_LIVED", 2), ("_CALIBRATIONS", 2)):
-        monkeypatch.setattr(tasks, name, value)
+def test_a_task_is_lived_as_decided_and_the_paper_steers_by_its_four_cases():
     report, seen = tasks.lived(0, PAPER)
     assert report
     assert len(seen) > 0
