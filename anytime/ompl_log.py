@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
 
@@ -36,7 +35,7 @@ def _lines(library: ProfileLibrary) -> Iterator[str]:
     yield "Experiment anytime"
     yield "0 experiment properties"
     yield f"Running on {'-'.join(library.machine.name.split())}"
-    yield f"Starting at {datetime.now():%Y-%m-%d %H:%M:%S}"
+    yield "Starting at 1970-01-01 00:00:00"  # profiles do not know when they were measured
     yield from ("<<<|", f"profiles of {', '.join(library)}", "|>>>")
     yield from ("<<<|", f"machine {library.machine.name}", "|>>>")
     yield "0 is the random seed"  # each run has one of its own
