@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import importlib
 import multiprocessing
+import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from multiprocessing.connection import wait
 from typing import Any
 
 from anytime.errors import AnytimeError
@@ -61,7 +64,20 @@ def _processes(count: int) -> Executor:
     """Processes that are started anew: a fork of a process with threads may deadlock."""
     methods = multiprocessing.get_all_start_methods()
     how = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
-    return ProcessPoolExecutor(count, mp_context=how)
+    return ProcessPoolExecutor(count, mp_context=how, initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """End this worker when the campaign dies, however: a pool does not outlive a SIGKILL else."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _dask(address: str) -> Executor:

@@ -1,5 +1,6 @@
 """Campaigns: the same bytes wherever the runs are made, whoever dies meanwhile."""
 
+import contextlib
 import functools
 import os
 import signal
@@ -256,6 +257,16 @@ def test_a_script_of_the_user_runs_its_own_modules_in_processes(tmp_path):
     assert anytime.ProfileLibrary(tmp_path / "out")["slow"].recordings
 
 
+def processes_of(folder):
+    """Those with the folder in their command line, where the system tells."""
+    found = []
+    for file in Path("/proc").glob("[0-9]*/cmdline"):
+        with contextlib.suppress(OSError):
+            if str(folder).encode() in file.read_bytes():
+                found.append(file.parent.name)
+    return found
+
+
 def test_a_campaign_killed_with_sigkill_goes_on_where_it_was(tmp_path):
     script, out, hold = tmp_path / "mine.py", tmp_path / "out", tmp_path / "hold"
     script.write_text(SCRIPT)
@@ -267,6 +278,8 @@ def test_a_campaign_killed_with_sigkill_goes_on_where_it_was(tmp_path):
         time.sleep(0.02)
     begun.kill()
     begun.wait()
+    while processes_of(tmp_path):  # none outlives it
+        time.sleep(0.02)
     hold.unlink()
     kept = store.read_bytes()
     subprocess.run([sys.executable, str(script), str(out), str(hold)], check=True)
