@@ -14,12 +14,13 @@ from anytime import running
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
 from anytime.modules import Module
-from anytime.pictures import duration, number
+from anytime.pictures import duration, figure
 from anytime.profiles import Profile
 from anytime.programs import Program, makers
 from anytime.results import Result, Status
 from compiler.adaptive import ceiling
 from compiler.advising import Advice, advise
+from compiler.allocations import Allocation
 from compiler.calibrating import Calibration, calibrate_by_running
 from compiler.compiled_profiles import profile_of
 from compiler.costs import stretched
@@ -37,22 +38,6 @@ from compiler.validating import Validation, lived, validate
 
 if TYPE_CHECKING:
     from compiler.activities import Activity
-
-
-@dataclass(frozen=True)
-class Allocation:
-    """Who gets how much of a budget, and what is expected of it.
-
-    shares: seconds by call; what is left of the budget is the last call's.
-    """
-
-    seconds: float
-    shares: Mapping[str, float]
-    promised: float
-
-    def __repr__(self) -> str:
-        parts = ", ".join(f"{label} {duration(s)}" for label, s in self.shares.items())
-        return f"{duration(self.seconds)}: {parts} → {number(self.promised)}"
 
 
 @dataclass(frozen=True)
@@ -361,10 +346,14 @@ class CompiledProgram:
         return np.geomspace(max(self.least, 1e-3 * most, 1e-9), max(most, 1e-9), count).tolist()
 
     def __repr__(self) -> str:
-        return text_of(self, self._budgets())
+        title = f"{self.program!r} on machine {self.machine}"
+        rows = [(self.allocate(each), self.interval(each)) for each in self._budgets()]
+        return text_of(title, rows, self.regret)
 
     def _repr_html_(self) -> str:
-        return picture_of(self, *self._budgets(2))
+        first, last = self._budgets(2)
+        allocations = [self.allocate(each) for each in np.geomspace(first, last, 80).tolist()]
+        return figure(picture_of(self.name, self.tables, allocations), repr(self))
 
 
 def _check_inputs(program: Program, inputs: Mapping[str, Any]) -> None:

@@ -3,56 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from anytime.pictures import duration, figure, line_chart, number
+from anytime.pictures import duration, line_chart, number
 from compiler import baselines
+from compiler.allocations import Allocation
 from compiler.explaining import certificate
-
-if TYPE_CHECKING:
-    from compiler.compiled import CompiledProgram
+from compiler.tables import Table
 
 
-def text_of(compiled: CompiledProgram, budgets: Sequence[float]) -> str:
-    """Shares and promises for budgets in seconds, in at most 100 columns."""
-    width = max(12, *(len(label) + 2 for label in compiled.labels))
-    header = "".join(f"{label:>{width}}" for label in compiled.labels)
-    lines = [
-        f"{compiled.program!r} on machine {compiled.machine}",
-        f"{'budget':>10}{header}   promised  95 %",
-    ]
-    for seconds in budgets:
-        allocation = compiled.allocate(seconds)
+def text_of(
+    title: str, rows: Sequence[tuple[Allocation, tuple[float, float]]], regret: float
+) -> str:
+    """Shares and promises with their 95 % intervals, a row a budget, in at most 100 columns."""
+    labels = list(rows[0][0].shares)
+    width = max(12, *(len(label) + 2 for label in labels))
+    header = "".join(f"{label:>{width}}" for label in labels)
+    lines = [title, f"{'budget':>10}{header}   promised  95 %"]
+    for allocation, (low, high) in rows:
         shares = "".join(f"{duration(s):>{width}}" for s in allocation.shares.values())
-        low, high = compiled.interval(seconds)
         lines.append(
-            f"{duration(seconds):>10}{shares}   {number(allocation.promised):>8}"
+            f"{duration(allocation.seconds):>10}{shares}   {number(allocation.promised):>8}"
             f"  [{number(low)}, {number(high)}]"
         )
-    lines.append(certificate(compiled.regret))
+    lines.append(certificate(regret))
     return "\n".join(line[:100] for line in lines)
 
 
-def picture_of(compiled: CompiledProgram, first: float, last: float) -> str:
-    """The compiled profile above MIN and MAX, and the shares, over budgets in seconds; HTML."""
-    times = np.geomspace(first, last, 80)
-    x = times.tolist()
+def picture_of(name: str, tables: Sequence[Table], allocations: Sequence[Allocation]) -> str:
+    """The compiled profile above MIN and MAX, and the shares, over the budgets; inline SVG."""
+    x = [allocation.seconds for allocation in allocations]
+    times = np.array(x)
     series = {
-        "compiled": (x, [compiled.promise(t) for t in x]),
-        "MIN": (x, baselines.minimal(compiled.tables, times).tolist()),
-        "MAX": (x, baselines.maximal(compiled.tables, times).tolist()),
+        "compiled": (x, [allocation.promised for allocation in allocations]),
+        "MIN": (x, baselines.minimal(tables, times).tolist()),
+        "MAX": (x, baselines.maximal(tables, times).tolist()),
     }
     above = line_chart(
         series,
         x_label="budget [s]",
         y_label="expected quality",
         dashed=("MIN", "MAX"),
-        title=compiled.name,
+        title=name,
     )
     shares = {
-        label: (x, [compiled.allocate(t).shares[label] / t for t in x]) for label in compiled.labels
+        label: (x, [each.shares[label] / each.seconds for each in allocations])
+        for label in allocations[0].shares
     }
-    below = line_chart(shares, x_label="budget [s]", y_label="share of the budget")
-    return figure(above + below, repr(compiled))
+    return above + line_chart(shares, x_label="budget [s]", y_label="share of the budget")
