@@ -18,7 +18,7 @@ from compiler.replaying import Replay
 from compiler.tables import Table, tables
 
 Floats = NDArray[np.float64]
-RUN = 12  # budgets at which a program is run to calibrate it
+RUN = 40  # divisions that are really run to calibrate a program
 BOOTSTRAPPED = 8  # budgets at which intervals are found by bootstrap
 RESAMPLES = 60  # of the problems, for these
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
@@ -92,14 +92,41 @@ def calibrate_by_running(
     tables: Sequence[Table], frontier: Frontier, run: Callable[[Sequence[float]], Floats]
 ) -> tuple[Frontier, Calibration]:
     """The same from really running a program: run(budgets) gives qualities [P, budgets] on
-    problems that the divisions were not chosen on."""
+    problems that the divisions were not chosen on.
+
+    In a long program neighbouring divisions may be worth very different qualities, for tables do
+    not tell all that goes on between modules. So only divisions that were run are kept, each that
+    is the best of those with no more time. To be the best of many flatters: what is promised is
+    what problems achieve with the divisions that are the best on the others.
+    """
     knots = _knots(frontier, RUN)
     values = run(frontier.budgets[knots].tolist())
+    kept = np.unique(_best_so_far(values))
+    lived = np.zeros(values.shape)
+    fold_of = np.arange(len(values)) % min(FOLDS, len(values))
+    for fold in range(FOLDS):
+        held = fold_of == fold
+        lived[held] = values[held][:, _best_so_far(values[~held])]
+    rows = knots[kept]
     worth = [
-        expected_quality(tables, moments_within(tables, shares.tolist()))
-        for shares in frontier.shares
+        expected_quality(tables, moments_within(tables, frontier.shares[row].tolist()))
+        for row in rows
     ]
-    return _calibrated(replace(frontier, promised=np.array(worth)), knots, values)
+    calibration = _isotonic(np.array(worth), lived[:, kept])
+    found = replace(
+        frontier,
+        budgets=frontier.budgets[rows],
+        shares=frontier.shares[rows],
+        promised=np.array(worth),
+    )
+    return calibration.applied(found), calibration
+
+
+def _best_so_far(values: Floats) -> NDArray[np.intp]:
+    """For each column of [P, K], the one with the best mean up to it."""
+    means = values.mean(axis=0)
+    better = means >= np.maximum.accumulate(means)
+    return np.maximum.accumulate(np.where(better, np.arange(len(means)), 0))
 
 
 def _calibrated(
