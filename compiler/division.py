@@ -59,7 +59,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     """The frontier of a program's divisions of time. [ZR93] §4, in the inverse domain.
 
     Over distributions and exact on the tables' moments where all divisions can be weighed at
-    once (three calls and more), for independent results, and for any number of calls where
+    once (three calls always can), for independent results, and for any number of calls where
     nothing is left to chance. Beyond, pairs of calls exchange their time optimally while the
     others keep theirs, starting from the best of the (min, +) solution for mean qualities and
     the plain divisions (MIN, MAX, equal shares), which it so never falls below. Modules with knobs
@@ -74,7 +74,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
         return _merged(tables, parts, objective)
     calls = [place for place, table in enumerate(tables) if table.rule is None]
     cells = math.prod(len(tables[place].times) for place in calls)
-    if len(calls) <= 2 or cells <= ALL:
+    if cells <= ALL:
         fixed = [0] * len(tables)
         return _frontier(tables, *_weighed(tables, fixed, calls, objective), objective)
     (totals, moments, values), proven = _from_mean_levels(tables, objective)
@@ -88,7 +88,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     least = float(totals[values > nothing(tables, objective)].min(initial=np.inf))
     most = float(costs.total(tables, [np.asarray(table.times[-1]) for table in tables]))
     if np.isfinite(least):
-        for budget in np.geomspace(max(least, 1e-6 * most, 1e-12), max(most, 1e-12), BUDGETS):
+        for budget in np.geomspace(max(least, 1e-6 * most), most, BUDGETS):
             inside = np.flatnonzero(totals <= budget + 1e-12)
             start = moments[inside[np.argmax(values[inside])]]
             found = _exchanged(tables, tuple(int(m) for m in start), float(budget), objective)
@@ -228,8 +228,9 @@ def _merged(
         rows[1:, list(parts[place])] = own.shares
         ends = (totals[:, None] + budgets).ravel()
         worth = (values[:, None] + gains).ravel()
-        late = (budgets > 0) & (ends.reshape(-1, len(budgets)) > rule.deadlines[place] + 1e-12)
-        kept = _best_first(ends, np.where(late.ravel(), -np.inf, worth), -np.inf)
+        # Who gets no time is never late: what came before ended by an earlier deadline.
+        late = ends > rule.deadlines[place] + 1e-12
+        kept = _best_first(ends, np.where(late, -np.inf, worth), -np.inf)
         before, added = np.divmod(kept, len(budgets))
         totals, values, shares = ends[kept], worth[kept], shares[before] + rows[added]
     kept = values > 1e-9

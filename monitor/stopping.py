@@ -147,7 +147,7 @@ def _stop(rule: StoppingRule, seconds: Floats, seen: Floats) -> tuple[int, int]:
 
 def _index(seconds: Floats, at: float, least: int) -> int:
     """Index of the first time that is not before `at`, at least `least`, at most the last."""
-    index = int(np.searchsorted(seconds, at - 1e-9 * max(abs(at), 1.0)))
+    index = int(np.searchsorted(seconds, at * (1 - 1e-9)))  # a sum of times may be off by a bit
     return min(max(index, least), len(seconds) - 1)
 
 

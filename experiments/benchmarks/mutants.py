@@ -39,9 +39,10 @@ Change = tuple[str, Callable[[], None], Callable[[], None]]
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module with one change."""
+    """A module with one change. text: of the line that is changed."""
 
     line: int
+    text: str
     change: str
     code: CodeType
 
@@ -51,11 +52,12 @@ def mutants(source: str, path: str) -> Iterator[Mutant]:
 
     source: of a module. path: of its file.
     """
-    tree = ast.parse(source)
+    tree, lines = ast.parse(source), source.splitlines()
     for node in _places(tree):
         for told, change, undo in _changes(node):
             change()
-            yield Mutant(node.lineno, told, compile(tree, path, "exec"))
+            text = lines[node.lineno - 1].strip()
+            yield Mutant(node.lineno, text, told, compile(tree, path, "exec"))
             undo()
 
 

@@ -27,7 +27,8 @@ _AT_ONCE = 60.0  # seconds that lock-step lives in one call: meanwhile nobody is
 def _numbers(call: str, *values: Any) -> None:
     """Raises what the caller is told if one is no finite number: anybody may send anything."""
     for value in values:
-        if not isinstance(value, float | int) or not math.isfinite(value):
+        number = isinstance(value, float | int) and not isinstance(value, bool)
+        if not number or not math.isfinite(value):
             raise RuntimeError(f"{call}: needs finite numbers, not {str(value)[:40]!r}")
 
 

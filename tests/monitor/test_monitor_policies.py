@@ -129,6 +129,17 @@ def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
     assert best_contract(fast, CONTRACTS, RHYTHM, Spread(), state()).why.prices["see"] < 0
 
 
+def test_the_spread_is_the_one_of_the_time_that_would_be_left_without_it():
+    asked = state()
+    plain = best_contract(MISSION, CONTRACTS, RHYTHM, Spread(), asked)
+    late = best_contract(MISSION, CONTRACTS, RHYTHM, Spread((0.0,), ((1.0, 1.8),)), asked)
+    left = plain.why.seconds
+    for beyond, expected in ((0.99 * left, late), (1.01 * left, plain)):
+        spread = Spread((0.0, beyond), ((1.0,), (1.0, 1.8)))
+        assert best_contract(MISSION, CONTRACTS, RHYTHM, spread, asked) == expected
+    assert late.why.net < plain.why.net
+
+
 @given(st.floats(1, 400), st.floats(1, 50))
 def test_a_longer_way_or_a_later_hour_never_promises_more(to_go, later):
     def promise(asked):

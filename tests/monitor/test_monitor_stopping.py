@@ -147,8 +147,71 @@ def test_scale_of_what_is_seen_is_learnt():
         (np.zeros(4), np.zeros((2, 4)), "increase"),
         (np.arange(4.0), np.full((2, 4), np.nan), "finite"),
         (np.arange(4.0), np.zeros(4), "same shape"),
+        (np.arange(4.0), np.zeros((2, 2, 4)), "same shape"),
+        (np.arange(4.0), np.zeros((0, 4)), "seconds has shape"),
+        (np.array([0.0, 1.0, 1.0, 2.0]), np.zeros((2, 4)), "increase"),
     ],
 )
 def test_runs_that_do_not_fit_are_refused(seconds, quality, message):
     with pytest.raises(AnytimeError, match=message):
         Runs(seconds, quality, quality)
+
+
+def test_what_was_seen_is_as_much_as_there_was_and_finite():
+    there = np.zeros((2, 4))
+    with pytest.raises(AnytimeError, match="same shape"):
+        Runs(np.arange(4.0), there, np.zeros((2, 3)))
+    with pytest.raises(AnytimeError, match="finite"):
+        Runs(np.arange(4.0), there, np.full((2, 4), np.nan))
+
+
+@pytest.mark.parametrize("look", [-0.1, float("nan"), float("inf")])
+def test_a_look_costs_a_finite_number(look):
+    with pytest.raises(AnytimeError, match="look"):
+        Task(TASK.utility, look)
+
+
+def patient(unit):
+    """Looks every third of a unit of time, three times, and stops a third later."""
+    return lambda history: unit / 3 if len(history.seconds) < 3 else Stop(unit / 3)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 86400.0, 1e12])
+def test_the_unit_of_time_makes_no_difference(unit):
+    runs = recorded(seconds=unit * np.arange(1, 31) / 3)
+    stopped = stop_runs(patient(unit), runs, TASK)
+    assert set(stopped.looks) == {3}
+    assert set(stopped.seconds) == {runs.seconds[3]}
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_the_unit_of_utility_makes_no_difference_to_what_is_missed(unit):
+    runs = recorded()
+    task = Task(lambda quality, seconds: unit * TASK.utility(quality, seconds))
+    ours, theirs = (stop_runs(lambda history: 3.0, runs, each) for each in (task, TASK))
+    assert ours.loss == pytest.approx(theirs.loss)
+    best = runs.utilities(TASK).max(axis=1)
+    assert theirs.loss * best == pytest.approx(best - theirs.utility)
+
+
+def at_time(seconds):
+    """Learns nothing and stops there."""
+    return lambda runs, task: lambda history: Stop(seconds)
+
+
+@given(st.integers(0, 500), st.integers(0, 29), st.integers(0, 29))
+@settings(max_examples=60)
+def test_a_rule_is_chosen_if_it_is_a_standard_error_better_and_nearly_the_best(seed, one, other):
+    runs = recorded(10, seed)
+    learners = {"one": at_time(SECONDS[one]), "other": at_time(SECONDS[other])}
+    choice = choose(runs, TASK, learners, folds=5, rng=np.random.default_rng(seed))
+    losses = {name: loss.mean() for name, loss in choice.losses.items()}
+
+    def apart(more, less):
+        difference = choice.losses[more] - choice.losses[less]
+        return difference.mean() / max(difference.std(ddof=1) / np.sqrt(10), 1e-12)
+
+    best = min(losses, key=losses.get)
+    nearly = [name for name in losses if apart(name, best) <= 1.0]
+    better = apart("fixed", nearly[0]) >= 1.0
+    assert choice.name == (nearly[0] if better else "fixed")
