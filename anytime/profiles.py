@@ -165,10 +165,7 @@ class Profile:
             each = stratum_weights(points[problems], target, there[problems])
             each = each.reshape(len(some), *there.shape) * alike
             weights[first : first + 64, rows[there]] = each[:, there]
-        total = weights.sum(axis=1, keepdims=True)
-        return np.where(
-            total > 0, weights / np.where(total > 0, total, 1.0), 1 / len(self.recordings)
-        )
+        return weights / weights.sum(axis=1, keepdims=True)  # each problem has a run, so > 0
 
     @cached_property
     def by_problem(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:

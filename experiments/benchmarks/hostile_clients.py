@@ -159,7 +159,7 @@ def ill_typed(rng: np.random.Generator) -> tuple[str, str, tuple[Any, ...]]:
 
 def _fits(value: Any, method: str) -> bool:
     """Whether it may be asked for, though there is no data of that name."""
-    return isinstance(value, list) if method == "getListData" else isinstance(value, str)
+    return value == [] if method == "getListData" else isinstance(value, str)
 
 
 def _served(server: ServedNao) -> tuple[float, tuple[Any, ...]]:

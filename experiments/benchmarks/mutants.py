@@ -62,11 +62,11 @@ def mutants(source: str, path: str) -> Iterator[Mutant]:
 
 
 def _places(node: ast.AST) -> Iterator[Any]:
-    """The nodes that compute: none in annotations, errors, texts, decorators."""
+    """The nodes that compute: none in annotations, errors, texts, decorators, assertions."""
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom):
         return
-    if isinstance(node, ast.Assert):
-        return
+    if isinstance(node, ast.Assert) or (isinstance(node, ast.keyword) and node.arg == "strict"):
+        return  # zip(…, strict=True) asserts that all are of one length
     if isinstance(node, ast.Compare | ast.BinOp | ast.AugAssign | ast.BoolOp | ast.UnaryOp):
         yield node
     if isinstance(node, ast.Constant | ast.Name | ast.Attribute):

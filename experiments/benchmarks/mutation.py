@@ -194,7 +194,7 @@ def main() -> None:
     for each in tried(60 * options.minutes, options.seed, targets, print):
         found.append(each)
         if not each.killed:
-            print(f"survived  {each}", flush=True)
+            print(f"survived  {each}  ({len(found)} tried)", flush=True)
     for name in targets:
         of_it = [each.killed for each in found if each.module == name]
         print(f"{name:22s} {sum(of_it):4d} of {len(of_it)} noticed")

@@ -104,6 +104,8 @@ class Memory:
         return value
 
     def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
+        if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
+            raise RuntimeError(f"ALMemory::getListData: needs names, not {str(keys)[:40]!r}")
         told = self._stage.live().sonars if self._stage.listened else (0.0, 0.0)
         heard = [NO_ECHO if each == math.inf else each for each in told]
         now = self._stage.memory | dict(zip(SONARS, heard, strict=True))

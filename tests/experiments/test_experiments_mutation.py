@@ -19,6 +19,10 @@ def judged(value: int = 2, *, strict=True) -> bool:
     if not strict or value < LIMIT:
         raise ValueError("at least 3" + str(value))
     return min(value, -1) == LIMIT - 1
+
+def paired(some, others):
+    assert len(some) < 9
+    return list(zip(some, others, strict=True))
 '''
 
 

@@ -18,6 +18,7 @@ from monitor.stopping import (
     fixed_contract,
     held_out,
     parts,
+    standard_error,
     stop_runs,
 )
 from monitor.stopping_rules import LEARNERS, dynamic_programming, forecast, true_of_seen
@@ -70,6 +71,18 @@ def test_rule_may_stop_later_without_looking():
     stopped = stop_runs(rule, runs, TASK)
     assert set(stopped.seconds) == {7.0}
     assert set(stopped.looks) == {1}
+
+
+def test_who_never_stops_is_stopped_by_the_last_time():
+    stopped = stop_runs(lambda history: 1.0, recorded(), TASK)
+    assert set(stopped.seconds) == {SECONDS[-1]}
+    assert set(stopped.looks) == {len(SECONDS)}
+
+
+def test_seconds_count_from_the_last_look():
+    runs = recorded()
+    rule = lambda history: Stop(2.0) if len(history.seconds) else 1.0  # noqa: E731
+    assert set(stop_runs(rule, runs, TASK).seconds) == {3.0}
 
 
 @pytest.mark.parametrize("answer", [0.0, -1.0, float("nan"), Stop(-1.0), Stop(float("inf"))])
@@ -130,8 +143,13 @@ def test_folds_share_the_runs_out():
     folds = parts(23, 5, np.random.default_rng(0).permutation(23))
     assert sorted(np.concatenate(folds)) == list(range(23))
     assert {len(fold) for fold in folds} == {4, 5}
-    with pytest.raises(AnytimeError, match="folds"):
-        parts(3, 5, np.arange(3))
+    assert [len(parts(count, folds, np.arange(count))) for count, folds in ((2, 2), (5, 2))] == [
+        2,
+        2,
+    ]
+    for folds in (0, 1, 4, 5):
+        with pytest.raises(AnytimeError, match="folds"):
+            parts(3, folds, np.arange(3))
 
 
 def test_scale_of_what_is_seen_is_learnt():
@@ -161,8 +179,10 @@ def test_what_was_seen_is_as_much_as_there_was_and_finite():
     there = np.zeros((2, 4))
     with pytest.raises(AnytimeError, match="same shape"):
         Runs(np.arange(4.0), there, np.zeros((2, 3)))
-    with pytest.raises(AnytimeError, match="finite"):
-        Runs(np.arange(4.0), there, np.full((2, 4), np.nan))
+    one_missing = np.array([[0.0, 0.0, np.nan, 0.0]] * 2)
+    for quality, seen in ((one_missing, there), (there, one_missing)):
+        with pytest.raises(AnytimeError, match="finite"):
+            Runs(np.arange(4.0), quality, seen)
 
 
 @pytest.mark.parametrize("look", [-0.1, float("nan"), float("inf")])
@@ -192,6 +212,11 @@ def test_the_unit_of_utility_makes_no_difference_to_what_is_missed(unit):
     assert ours.loss == pytest.approx(theirs.loss)
     best = runs.utilities(TASK).max(axis=1)
     assert theirs.loss * best == pytest.approx(best - theirs.utility)
+
+
+def test_the_standard_error_is_of_a_mean_of_a_sample():
+    assert standard_error(np.array([0.0, 2.0])) == pytest.approx(1.0)
+    assert standard_error(np.array([1.0, 2.0, 3.0, 4.0])) == pytest.approx(np.sqrt(5 / 12))
 
 
 def at_time(seconds):
