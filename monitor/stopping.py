@@ -136,7 +136,7 @@ def _stop(rule: StoppingRule, seconds: Floats, seen: Floats) -> tuple[int, int]:
         if isinstance(answer, Stop):
             if not 0 <= answer.after < math.inf:
                 raise AnytimeError(f"a rule stops after {answer.after} s; it must be >= 0")
-            return _index(seconds, base + answer.after, max(now, 0)), looks
+            return _index(seconds, base + answer.after, 0), looks
         if not answer > 0:
             raise AnytimeError(f"a rule returned {answer}; return seconds > 0, or STOP")
         now = _index(seconds, base + answer, now + 1)

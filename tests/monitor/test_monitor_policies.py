@@ -170,16 +170,20 @@ def of_four_problems(name, inputs, times, qualities):
     )
 
 
-@pytest.fixture(scope="module")
-def three_calls():
-    """A program whose last call has a result at once, a worse one later, then a better."""
+def of_three_calls(plans):
+    """A program whose last call has results of these qualities, the first of them at once."""
     profiles = {
         "look": of_four_problems("look", (), [1.0, 2.0], [0.4, 1.0]),
         "match": of_four_problems("match", ("seen",), [0.5, 2.5], [0.5, 0.9]),
-        "plan": of_four_problems("plan", ("matched",), [0.0, 1.5, 2.5], [0.5, 0.4, 0.9]),
+        "plan": of_four_problems("plan", ("matched",), [0.0, 1.5, 2.5], plans),
     }
     library = ProfileLibrary(profiles=profiles, machine=Machine("lab"))
     return compiler.compile(look_match_plan, library)
+
+
+@pytest.fixture(scope="module")
+def three_calls():
+    return of_three_calls([0.5, 0.4, 0.9])
 
 
 def test_of_three_calls_the_last_plans_as_long_as_is_of_use_and_no_longer(three_calls):
@@ -194,7 +198,20 @@ def test_of_three_calls_the_last_plans_as_long_as_is_of_use_and_no_longer(three_
 def test_a_tenth_more_that_reaches_no_later_result_is_worth_nothing(three_calls):
     contracts = pinned_contracts(three_calls, "min")
     assert contracts.probes == pytest.approx(np.tile(contracts.efficiency[:, None], 3))
-    assert (contracts.efficiency < 1.0).any()
+    # the first plan, at once, is worth .5, and the last .9, each times what was seen and matched
+    assert contracts.efficiency.tolist() == pytest.approx([5 / 9, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("plans", "efficiency"), [([0.9, 0.8, 0.3], [1.0]), ([0.01, 0.01, 0.9], [0.05, 1.0])]
+)
+def test_no_plan_makes_a_frame_longer_than_twentyfold_or_shorter_than_the_best(plans, efficiency):
+    contracts = pinned_contracts(of_three_calls(plans), "min")
+    assert contracts.efficiency.tolist() == pytest.approx(efficiency)
+
+
+def test_unless_it_was_lived_a_second_foreseen_is_a_second():
+    assert Spread() == Spread((0.0,), ((1.0,),))
 
 
 def test_the_contracts_reach_from_the_least_to_the_best_that_was_compiled(three_calls):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from anytime.errors import AnytimeError
 from monitor.stopping import (
     STOP,
+    History,
     Runs,
     Stop,
     Task,
@@ -79,6 +80,27 @@ def test_who_never_stops_is_stopped_by_the_last_time():
     assert set(stopped.looks) == {len(SECONDS)}
 
 
+def test_who_hardly_goes_on_comes_to_the_next_time():
+    stopped = stop_runs(lambda history: 1e-9, recorded(), TASK)
+    assert set(stopped.looks) == {len(SECONDS)}
+
+
+def test_a_fixed_contract_that_is_asked_late_stops_at_the_same_time_or_at_once():
+    runs = recorded()
+    rule = fixed_contract(runs, TASK)
+    best = rule(History(SECONDS[:0], SECONDS[:0])).after
+    seen = runs.seen[0]
+    assert 3 < best < 27
+    assert rule(History(SECONDS[:3], seen[:3])).after == best - 3.0
+    assert rule(History(SECONDS[:28], seen[:28])).after == 0.0
+
+
+def test_who_stops_at_once_has_what_there_is_first():
+    stopped = stop_runs(lambda history: STOP, recorded(), TASK)
+    assert set(stopped.seconds) == {SECONDS[0]}
+    assert not stopped.looks.any()
+
+
 def test_seconds_count_from_the_last_look():
     runs = recorded()
     rule = lambda history: Stop(2.0) if len(history.seconds) else 1.0  # noqa: E731
@@ -137,6 +159,12 @@ def test_better_rule_is_chosen_and_of_two_equal_ones_the_first():
     choice = choose(recorded(60), TASK, learners, folds=6, rng=np.random.default_rng(0))
     assert choice.name == "mine"
     assert set(choice.losses) == {"mine", "twin", "fixed"}
+
+
+def test_runs_are_parted_in_ten_unless_told_otherwise():
+    choose(recorded(10), TASK, {"forecast": forecast}, rng=np.random.default_rng(0))
+    with pytest.raises(AnytimeError, match="9 runs in 10 folds"):
+        choose(recorded(9), TASK, {"forecast": forecast}, rng=np.random.default_rng(0))
 
 
 def test_folds_share_the_runs_out():
