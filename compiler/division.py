@@ -245,15 +245,15 @@ def _exchanged(
     calls = [place for place, table in enumerate(tables) if table.rule is None]
     met: list[Divisions] = []
     for _ in range(SWEEPS):
-        before = value
+        before = best
         for pair in itertools.combinations(calls, 2):
             totals, moments, values = _weighed(tables, best, pair, objective)
             inside = np.flatnonzero(totals <= budget + 1e-12)
             top = inside[np.argmax(values[inside])]
-            if values[top] > value + 1e-12:
+            if values[top] > value:
                 best, value = tuple(int(m) for m in moments[top]), float(values[top])
             met.append(_undominated(totals, moments, values, -np.inf))
-        if value <= before + 1e-12:
+        if best == before:
             break
     return (
         np.concatenate([totals for totals, _, _ in met]),
@@ -322,8 +322,8 @@ def _best_first(totals: Floats, values: Floats, floor: float) -> NDArray[np.intp
     """Places of the divisions worth more than `floor` and than any as fast, in order of time."""
     order = np.lexsort((-values, totals))
     ordered = values[order]
-    best_before = np.concatenate([[floor], np.maximum.accumulate(ordered)[:-1]])
-    return order[ordered > np.maximum(best_before, floor) + 1e-9]
+    before = np.maximum.accumulate(np.concatenate([[floor], ordered[:-1]]))
+    return order[ordered > before + 1e-9]
 
 
 def _undominated(

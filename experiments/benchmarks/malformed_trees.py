@@ -36,7 +36,7 @@ def tree_changed(tree: Any, rng: np.random.Generator) -> Any:
     """The tree with one node changed: replaced, dropped, doubled or swapped with a neighbour."""
     places = list(_places(tree))
     if not places:
-        return _WORST[int(rng.integers(len(_WORST)))]
+        return _worst(rng)
     holder, key = places[int(rng.integers(len(places)))]
     way = int(rng.integers(5))
     if way == 0:
@@ -50,8 +50,12 @@ def tree_changed(tree: Any, rng: np.random.Generator) -> Any:
         with contextlib.suppress(LookupError, TypeError):
             holder[key] = copy.deepcopy(other[place])
     else:
-        holder[key] = _WORST[int(rng.integers(len(_WORST)))]
+        holder[key] = _worst(rng)
     return tree
+
+
+def _worst(rng: np.random.Generator) -> Any:
+    return copy.deepcopy(_WORST[int(rng.integers(len(_WORST)))])  # it may be changed in its turn
 
 
 def _places(tree: Any) -> Iterator[tuple[Any, Any]]:

@@ -41,7 +41,7 @@ TARGETS = {
 """What is changed, and the tests that should notice."""
 
 _LOADED = ("numpy", "scipy.stats", "hypothesis", "pytest", "msgspec", "numba")
-_UNSHRUNK = "unshrunk"
+_FEW, _FULL = "few", "full"
 _SLACK = 20.0  # seconds beyond three times what the unchanged program takes: then it hangs
 
 
@@ -74,14 +74,14 @@ def tried(
     for name in _LOADED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
-    _without_shrinking()
+    _profiles()
     all_of = [(name, mutant) for name in targets for mutant in counted(name)]
     random.Random(seed).shuffle(all_of)
     progress(f"{len(all_of)} mutants of {len(targets)} modules")
     taken = dict[tuple[str, ...], float]()
     for tests in {TARGETS[name] for name in targets}:
         begun = time.perf_counter()
-        if not _passes(None, None, tests, 600.0):
+        if not _passes(None, None, tests, 600.0, _FULL):
             raise RuntimeError(f"{', '.join(tests)} fail as they are")
         taken[tests] = time.perf_counter() - begun
     until = time.perf_counter() + seconds
@@ -89,7 +89,8 @@ def tried(
         if time.perf_counter() > until:
             return
         tests = TARGETS[name]
-        passes = _passes(name, mutant.code, tests, 3 * taken[tests] + _SLACK)
+        most = 3 * taken[tests] + _SLACK
+        passes = all(_passes(name, mutant.code, tests, most, each) for each in (_FEW, _FULL))
         yield Tried(name, mutant, killed=not passes)
 
 
@@ -115,22 +116,29 @@ def figures(found: Sequence[Tried]) -> dict[str, float | int | None]:
     return {**shares, "mutation.count": len(found)}
 
 
-def _without_shrinking() -> None:
-    """Hypothesis looks for counter-examples as it does in tests, but not for the smallest."""
+def _profiles() -> None:
+    """Hypothesis looks for counter-examples as it does in tests, but not for the smallest; first
+    among few examples, where most mutants show."""
     from hypothesis import Phase, settings
 
     phases = (Phase.explicit, Phase.generate)
-    settings.register_profile(_UNSHRUNK, deadline=None, derandomize=True, phases=phases)
+    every = settings(
+        settings.get_profile("default"), deadline=None, derandomize=True, phases=phases
+    )
+    settings.register_profile(_FULL, every)
+    settings.register_profile(_FEW, every, max_examples=10)
 
 
-def _passes(name: str | None, code: CodeType | None, tests: tuple[str, ...], most: float) -> bool:
+def _passes(
+    name: str | None, code: CodeType | None, tests: tuple[str, ...], most: float, profile: str
+) -> bool:
     """Whether tests pass with a module's code in place of its file's, within so many seconds."""
     child = os.fork()
     if child == 0:
         status = 70
         try:
             os.setsid()
-            status = _tested(name, code, tests)
+            status = _tested(name, code, tests, profile)
         finally:
             os._exit(status)
     until = time.perf_counter() + most
@@ -144,7 +152,7 @@ def _passes(name: str | None, code: CodeType | None, tests: tuple[str, ...], mos
     return False
 
 
-def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...]) -> int:
+def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...], profile: str) -> int:
     import pytest
 
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -156,7 +164,7 @@ def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...]) -> 
         sys.meta_path.insert(0, _Changed(name, code))
     files = [str(ROOT / "tests" / each) for each in tests]
     options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", f"--rootdir={ROOT}"]
-    options += [f"--hypothesis-profile={_UNSHRUNK}"]
+    options += [f"--hypothesis-profile={profile}"]
     options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # loaded before the fork
     return int(pytest.main([*options, *files]))
 

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError
-from anytime.joins import Several
+from anytime.joins import Best, Several
+from anytime.structure import Arm
 from compiler import division, equal_shares, maximal, minimal
 from compiler.advising import advise
 from compiler.baselines import divided
@@ -207,6 +208,7 @@ def test_flat_profiles_are_divided_the_same_way_every_time():
         for t in chancy(SHAPES["three"], 3)
     )
     one, other = divide(tables), divide(tables)
+    assert (np.diff(one.promised) > 0).all()
     assert one.shares.tobytes() == other.shares.tobytes()
     assert one.promised.tobytes() == other.promised.tobytes()
 
@@ -223,8 +225,10 @@ def test_a_program_that_never_has_a_result_has_no_division():
     assert len(divide((table, fed, last)).budgets) == 0
 
 
-def test_a_poor_program_of_three_calls_still_has_a_result():
+@pytest.mark.parametrize("most", [division.ALL, 0])
+def test_a_poor_program_of_three_calls_still_has_a_result(most, monkeypatch):
     """Each call rarely has a result, so that its mean is nearer to none than to any."""
+    monkeypatch.setattr(division, "ALL", most)
 
     def rare(label, feeds):
         chances = np.zeros((*([2] * len(feeds)), 2, 2))
@@ -331,6 +335,11 @@ def test_exchanged_divisions_are_nearly_the_best_and_keep_their_promise(objectiv
     for budget, promised in zip(best.budgets, best.promised, strict=True):
         assert frontier.index(budget) >= 0
         assert promised - 0.005 <= frontier.promise(budget) <= promised + 1e-8
+    if objective == EXPECTED:
+        budgets = np.linspace(0, 1.2 * total(tables), 20)
+        promised = np.array([frontier.promise(budget) for budget in budgets])
+        for plain in (minimal, maximal, equal_shares):
+            assert (promised >= plain(tables, budgets) - 1e-8).all(), plain.__name__
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -341,6 +350,52 @@ def test_without_chance_it_says_when_it_is_exact(shared):
             tables = random_program(rng, shared)
             assert divide(tables).exact
             assert not mismatch(tables)
+            assert not divide(tables, OBJECTIVES[-1]).exact
+
+
+def test_what_is_exchanged_is_hardly_ever_less_than_the_best():
+    """No law: of the steps of the exact frontiers of many programs, how many are found."""
+    found = []
+    for seed in range(6):
+        for name in ("three", "tree", "shared", "four"):
+            tables = chancy(SHAPES[name], seed)
+            best = divide(tables)
+            with too_many():
+                frontier = divide(tables)
+            found += [
+                frontier.promise(budget) >= promised - 1e-9
+                for budget, promised in zip(best.budgets, best.promised, strict=True)
+            ]
+    assert np.mean(found) > 0.9
+
+
+# Modules that can be set
+
+
+def test_of_the_settings_of_a_module_the_best_for_each_budget_has_the_time():
+    """A quick setting that is poor and a slow one that is good."""
+    sure, none = np.eye(2), np.zeros(1)
+    quick, slow, poor = (
+        Table(f"m@k={k}", f"m@k={k}", (), np.array([0.0, q]), np.array([0.0, t]), sure, t)
+        for k, q, t in ((1, 0.4, 1.0), (2, 0.9, 3.0), (3, 0.3, 2.0))
+    )
+    levels = np.array([0.0, 0.3, 0.4, 0.9])
+    for settings_, promised in (
+        ((quick, slow), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9), (9.0, 0.9)]),
+        ((slow, quick, poor), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9)]),
+        ((poor, quick), [(0.5, 0.0), (1.0, 0.4), (2.0, 0.4), (9.0, 0.4)]),
+    ):
+        chances = np.zeros((*[2] * len(settings_), 1, len(levels)))
+        for cell in np.ndindex(*chances.shape[:-2]):
+            made = [t.levels[1] for t, there in zip(settings_, cell, strict=True) if there]
+            chances[(*cell, 0, int(np.searchsorted(levels, max(made, default=0.0))))] = 1.0
+        feeds = tuple(table.label for table in settings_)
+        best = Table("best", "", feeds, levels, none, chances, 0.0, rule=Best(True))
+        frontier = divide((*settings_, best))
+        assert frontier.exact
+        assert (np.diff(frontier.promised) > 0).all()
+        assert [frontier.promise(budget) for budget, _ in promised] == [p for _, p in promised]
+        assert ((frontier.shares > 0).sum(axis=1) == 1).all()
 
 
 # Several results that share nothing
@@ -421,6 +476,52 @@ def test_independent_results_are_exact_if_each_is():
         assert not divide(together([three, sure], [1.0, 1.0], [np.inf, np.inf])).exact
         assert not divide(together([sure, three], [1.0, 1.0], [np.inf, np.inf])).exact
         assert divide(together([sure, sure], [1.0, 1.0], [np.inf, np.inf])).exact
+
+
+def sharing(tables, outputs):
+    """A program of several results, which may come of the same calls."""
+    qualities = sum(
+        np.expand_dims(
+            tables[call].levels / len(outputs), [a for a in range(len(outputs)) if a != axis]
+        )
+        for axis, call in enumerate(outputs)
+    )
+    levels, place = np.unique(qualities, return_inverse=True)
+    chances = np.eye(len(levels))[place.reshape(qualities.shape)][..., None, :]
+    feeds = tuple(tables[call].label for call in outputs)
+    rule = Several((1.0,) * len(outputs), (np.inf,) * len(outputs))
+    return (*tables, Table("all", "", feeds, levels, np.zeros(1), chances, 0.0, rule=rule))
+
+
+@pytest.mark.parametrize(
+    ("feeds", "outputs"),
+    [(([], [0], [0]), (1, 2)), (([], [0]), (0, 1)), (([], [], [1], [1]), (0, 2, 3))],
+)
+def test_results_that_share_a_call_are_divided_together(feeds, outputs):
+    for seed in range(4):
+        tables = sharing(chancy(feeds, seed), outputs)
+        assert division.independent(tables) is None
+        frontier, every = divide(tables), weighed(tables, EXPECTED)
+        for budget in {seconds for seconds, _ in every}:
+            best = max(value for seconds, value in every if seconds <= budget + 1e-12)
+            assert frontier.promise(budget) == pytest.approx(best, abs=1e-8)
+
+
+def test_a_result_that_is_told_twice_is_one():
+    (one,) = chancy(SHAPES["one"], 3)
+    levels = one.levels
+    chances = np.eye(len(levels))[:, None, :]
+    rule = Several((1.0, 2.0), (np.inf, np.inf))
+    twice = Table("all", "", ("call 0",), levels, np.zeros(1), chances, 0.0, rule=rule)
+    assert divide((one, twice)).promise(9.0) == pytest.approx(divide((one,)).promise(9.0))
+
+
+def test_the_calls_of_independent_results_are_told_apart():
+    tables = together([chancy(SHAPES["chain"], 1), chancy(SHAPES["one"], 2)], [1, 1], [9.0, 9.0])
+    assert division.independent(tables) == ((0, 1), (2,))
+    arms = [replace(t, path=(Arm("fork", place, 0),)) for place, t in enumerate(tables[1:3])]
+    assert division.independent((tables[0], *arms, tables[3])) is None
+    assert division.independent(tables[:2]) is None
 
 
 @pytest.mark.parametrize("objective", [OBJECTIVES[2], OBJECTIVES[4]], ids=repr)
