@@ -23,7 +23,7 @@ from anytime.errors import AnytimeError
 from experiments.benchmarks.file_kinds import Kind, all_kinds
 from experiments.benchmarks.malformed_trees import bytes_changed, tree_changed
 
-RAW = 0.15  # share of the corpus that is raw bytes
+RAW = 0.1  # share of the corpus that is raw bytes
 COMMANDS = 0.01  # share of the corpus that the command line reads as well
 
 

@@ -200,6 +200,14 @@ def test_where_the_pace_is_unsure_the_band_holds_all_that_it_may_be(profile, tim
     assert high[0] == max(high[0] for _, high in bands)
 
 
+def test_the_band_is_narrow_where_the_problems_agree_and_wide_where_they_do_not():
+    apart = [recording(f"p{i}", [0.5, i / 10], features={"x": float(i)}) for i in range(11)]
+    for profile in (Profile("see", (), tuple(apart)), Profile("see", (), tuple(apart)).given(x=3)):
+        low, high = profile.band([1.0, 2.0])
+        assert high - low == pytest.approx([0.0, (high - low)[1]], abs=1e-6)
+        assert high[1] - low[1] > 0.1
+
+
 def test_a_band_of_more_confidence_is_wider_and_covers_so_often():
     rng = np.random.default_rng(2)
     widths, covered = [], []
@@ -371,9 +379,13 @@ def test_the_text_says_when_results_get_worse_and_by_how_much_it_matters(end, to
 
 
 def test_the_text_says_how_long_the_runs_were_and_when_there_was_a_first_result():
-    text = repr(Profile("see", (), (recording("a", [0.4, 0.9], [1.0, 2.0], end=8.0),)))
+    long, short = recording("a", [0.4, 0.9], [1.0, 2.0], end=8.0), recording("a", [], end=3.0)
+    text = repr(Profile("see", (), (short, long)))
+    assert text.startswith("see  ▁▁")
     assert "in 8.00 s, first 1.00 s" in text
-    assert "1 problems, 1 runs" in text
+    assert "1 problems, 2 runs" in text
+    assert "in 500.0 ms" in repr(Profile("see", (), (recording("a", [0.4], [0.5]),)))
+    assert len(repr(Profile("x" * 200, (), (long,)))) == 100
 
 
 def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good_ones():
@@ -382,11 +394,15 @@ def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good
     picture = profile.picture()
     assert all(f"boxes = {level}" in picture for level in (0.1, 0.5, 0.9))
     assert "boxes = " not in profile.given(boxes=0.5).picture()
+    thirds = [recording("a", [b], inputs={"boxes": b, "way": 1.0}) for b in (1 / 3, 2 / 3)]
+    assert "boxes = 0.37<" in Profile("find", ("boxes",), tuple(thirds)).picture()
+    assert "boxes = " not in Profile("find", ("boxes", "way"), tuple(thirds)).picture()
 
 
 def test_the_text_says_how_many_problems_a_condition_leaves():
     runs_ = tuple(recording(f"p{i}", [0.5], features={"density": float(i)}) for i in range(9))
-    assert "n_eff" in repr(Profile("see", (), runs_).given(density=0.0))
+    text = repr(Profile("see", (), runs_).given(density=0.0))
+    assert "given density=0 | 9 problems, 9 runs (n_eff 3" in text
 
 
 def test_a_distribution_is_what_its_weights_say():

@@ -306,6 +306,28 @@ def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation, co
     assert keep_course(mission, ahead).speed == pytest.approx(4.0 * (1 - gain * early))
 
 
+def test_a_deviation_counts_no_more_than_a_contract_and_never_stops_the_robot():
+    mission = replace(MISSION, gain=1.0, speeds=(0.1, 100.0))
+    far_behind = on_course(late=3.0, advertised=0.5, seen=0.9)
+    assert keep_course(mission, far_behind).speed == 8.0
+    at_the_goal = replace(
+        on_course(advertised=0.5, seen=0.1), time=0.0, situation=Situation(0.0, 9.0, 0.0)
+    )
+    assert keep_course(mission, at_the_goal).speed == pytest.approx(0.4)
+
+
+def test_the_change_of_speed_stays_within_the_limits():
+    mission = replace(MISSION, gain=1.0, speeds=(3.5, 4.5))
+    assert keep_course(mission, on_course(late=0.9, advertised=0.5, seen=0.9)).speed == 4.5
+    assert keep_course(mission, on_course(late=-0.4, advertised=0.5, seen=0.1)).speed == 3.5
+
+
+def test_a_contract_of_no_time_stands():
+    contract = Decision({"see": 0.0}, 4.0)
+    asked = state(in_hand=4.0, moment="call", contract=contract, advertised=0.5, seen=0.9)
+    assert keep_course(MISSION, asked) is contract
+
+
 def test_who_is_neither_ahead_nor_behind_keeps_course():
     for seen in (0.1, 0.5, 0.9):
         assert keep_course(MISSION, on_course(advertised=0.5, seen=seen)).why.case == "keep course"
