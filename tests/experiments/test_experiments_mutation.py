@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.benchmarks import mutation
+from experiments.benchmarks.equivalent_mutants import EQUIVALENT
 from experiments.benchmarks.mutants import mutants
 from experiments.benchmarks.soak import slope
 
@@ -56,6 +57,13 @@ def test_a_mutant_behaves_as_it_was_changed_and_the_next_is_whole_again():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="mutants are run in forks")
 def test_the_tests_that_should_notice_are_there():
     assert mutation.available()
+
+
+@pytest.mark.parametrize("module", EQUIVALENT)
+def test_what_is_listed_as_equivalent_is_a_change_of_a_line_that_is_there(module):
+    there = {(each.text, each.change) for each in mutation.every(module)}
+    assert set(EQUIVALENT[module]) <= there
+    assert all(EQUIVALENT[module].values())
 
 
 @given(st.floats(-50, 50), st.floats(0, 1e3), st.integers(3, 400))
