@@ -348,7 +348,9 @@ def test_without_chance_it_says_when_it_is_exact(shared):
     with too_many():
         for _ in range(20):
             tables = random_program(rng, shared)
-            assert divide(tables).exact
+            frontier = divide(tables)
+            assert frontier.exact
+            assert (np.diff(frontier.budgets) > 0).all()
             assert not mismatch(tables)
             assert not divide(tables, OBJECTIVES[-1]).exact
 
@@ -377,13 +379,13 @@ def test_of_the_settings_of_a_module_the_best_for_each_budget_has_the_time():
     sure, none = np.eye(2), np.zeros(1)
     quick, slow, poor = (
         Table(f"m@k={k}", f"m@k={k}", (), np.array([0.0, q]), np.array([0.0, t]), sure, t)
-        for k, q, t in ((1, 0.4, 1.0), (2, 0.9, 3.0), (3, 0.3, 2.0))
+        for k, q, t in ((1, 0.4, 1.0), (2, 0.9, 3.0), (3, 0.5, 3.0))
     )
-    levels = np.array([0.0, 0.3, 0.4, 0.9])
+    levels = np.array([0.0, 0.4, 0.5, 0.9])
     for settings_, promised in (
         ((quick, slow), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9), (9.0, 0.9)]),
         ((slow, quick, poor), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9)]),
-        ((poor, quick), [(0.5, 0.0), (1.0, 0.4), (2.0, 0.4), (9.0, 0.4)]),
+        ((poor, quick), [(0.5, 0.0), (1.0, 0.4), (2.0, 0.4), (9.0, 0.5)]),
     ):
         chances = np.zeros((*[2] * len(settings_), 1, len(levels)))
         for cell in np.ndindex(*chances.shape[:-2]):
@@ -393,6 +395,7 @@ def test_of_the_settings_of_a_module_the_best_for_each_budget_has_the_time():
         best = Table("best", "", feeds, levels, none, chances, 0.0, rule=Best(True))
         frontier = divide((*settings_, best))
         assert frontier.exact
+        assert (np.diff(frontier.budgets) > 0).all()
         assert (np.diff(frontier.promised) > 0).all()
         assert [frontier.promise(budget) for budget, _ in promised] == [p for _, p in promised]
         assert ((frontier.shares > 0).sum(axis=1) == 1).all()
