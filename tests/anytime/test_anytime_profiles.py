@@ -355,6 +355,12 @@ def test_quality_of_a_cost_is_the_cheapest_known_for_the_problem_by_it():
         assert [q.tolist() for q in profile.qualities] == [[0.5, 1.0], [0.5], [1.0]]
 
 
+def test_the_unit_of_a_cost_makes_no_difference():
+    for unit in (1e-6, 1.0, 1e6):
+        profile = Profile("find", (), (recording("a", [4 * unit, 2 * unit]),), {"a": 1 * unit})
+        assert profile.qualities[0] == pytest.approx([0.25, 0.5])
+
+
 def test_a_beaten_reference_gives_no_quality_above_one():
     profile = Profile("find", (), (recording("a", [2.0]),), {"a": 4.0})
     assert profile.qualities[0].tolist() == [1.0]
@@ -384,7 +390,7 @@ def test_the_text_says_how_long_the_runs_were_and_when_there_was_a_first_result(
     assert text.startswith("see  ▁▁")
     assert "in 8.00 s, first 1.00 s" in text
     assert "1 problems, 2 runs" in text
-    assert "in 500.0 ms" in repr(Profile("see", (), (recording("a", [0.4], [0.5]),)))
+    assert "q .40 in 500.0 ms" in repr(Profile("see", (), (recording("a", [0.4], [0.5]),)))
     assert len(repr(Profile("x" * 200, (), (long,)))) == 100
 
 
