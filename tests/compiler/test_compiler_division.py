@@ -79,8 +79,10 @@ def test_no_division_of_a_program_without_chance_beats_the_compiled_one(shared):
     assert sum(mismatch(random_program(rng, shared)) for _ in range(300)) == 0
 
 
-def test_a_result_of_quality_zero_is_not_mistaken_for_no_result():
+@pytest.mark.parametrize("most", [division.ALL, 0])
+def test_a_result_of_quality_zero_is_not_mistaken_for_no_result(most, monkeypatch):
     """The first module's only result is worthless by itself, and yet the others need it."""
+    monkeypatch.setattr(division, "ALL", most)
     quality = np.array([0.0, 0.0])
     sure = np.zeros((2, 2))
     sure[0, 0] = sure[1, 1] = 1.0
