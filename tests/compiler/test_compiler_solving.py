@@ -157,3 +157,10 @@ def test_large_tables_are_joined_in_pieces_with_the_same_result():
         + fourth[:, None, :, :]
     )
     assert found == pytest.approx(joined.min(axis=0))
+
+
+@pytest.mark.parametrize("semiring", [MIN_PLUS, SUM_PRODUCT], ids=["(min, +)", "(+, ×)"])
+def test_a_variable_of_very_many_levels_is_summed_out(semiring):
+    cells = np.random.default_rng(0).random(3 * elimination.PIECE)
+    found = eliminate([Factor(("a",), cells)], (), semiring)[0].table
+    assert found == pytest.approx(semiring.total.reduce(cells))
