@@ -85,11 +85,11 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     totals = np.concatenate([totals, plain[0]])
     moments = np.concatenate([moments, plain[1]])
     values = np.concatenate([values, plain[2]])
-    least = float(totals[values > nothing(tables, objective)].min(initial=np.inf))
+    worth = totals[(values > nothing(tables, objective)) & (totals > 0)]
     most = float(costs.total(tables, [np.asarray(table.times[-1]) for table in tables]))
-    if np.isfinite(least):
-        for budget in np.geomspace(max(least, 1e-6 * most), most, BUDGETS):
-            inside = np.flatnonzero(totals <= budget + 1e-12)
+    if len(worth):
+        for budget in np.geomspace(worth.min(), most, BUDGETS):
+            inside = np.flatnonzero(totals <= budget)
             start = moments[inside[np.argmax(values[inside])]]
             found = _exchanged(tables, tuple(int(m) for m in start), float(budget), objective)
             totals = np.concatenate([totals, found[0]])
@@ -248,7 +248,7 @@ def _exchanged(
         before = best
         for pair in itertools.combinations(calls, 2):
             totals, moments, values = _weighed(tables, best, pair, objective)
-            inside = np.flatnonzero(totals <= budget + 1e-12)
+            inside = np.flatnonzero(totals <= budget)
             top = inside[np.argmax(values[inside])]
             if values[top] > value:
                 best, value = tuple(int(m) for m in moments[top]), float(values[top])

@@ -34,7 +34,7 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
         ("return order[ordered > before + 1e-9]", "Gt → GtE"): _TIE,
         ("late = ends > rule.deadlines[place] + 1e-12", "Gt → GtE"): _TIE,
         (
-            "inside = np.flatnonzero(totals <= budget + 1e-12)",
+            "inside = np.flatnonzero(totals <= budget)",
             "LtE → Lt",
         ): _TIE,
     },

@@ -344,6 +344,19 @@ def test_exchanged_divisions_are_nearly_the_best_and_keep_their_promise(objectiv
             assert (promised >= plain(tables, budgets) - 1e-8).all(), plain.__name__
 
 
+def test_what_has_a_result_at_once_is_divided_as_well():
+    for seed in range(3):
+        tables = tuple(
+            replace(t, chances=np.concatenate([t.chances[..., 1:, :], t.chances[..., -1:, :]], -2))
+            for t in chancy(SHAPES["three"], seed)
+        )
+        with too_many():
+            frontier = divide(tables)
+        assert frontier.budgets[0] == 0
+        for seconds, value in weighed(tables, EXPECTED):
+            assert frontier.promise(seconds) >= value - 0.005
+
+
 @pytest.mark.parametrize("shared", [False, True])
 def test_without_chance_it_says_when_it_is_exact(shared):
     rng = np.random.default_rng(5)
