@@ -389,31 +389,51 @@ def test_what_is_exchanged_is_hardly_ever_less_than_the_best():
 # Modules that can be set
 
 
-def test_of_the_settings_of_a_module_the_best_for_each_budget_has_the_time():
-    """A quick setting that is poor and a slow one that is good."""
-    sure, none = np.eye(2), np.zeros(1)
-    quick, slow, poor = (
-        Table(f"m@k={k}", f"m@k={k}", (), np.array([0.0, q]), np.array([0.0, t]), sure, t)
-        for k, q, t in ((1, 0.4, 1.0), (2, 0.9, 3.0), (3, 0.5, 3.0))
-    )
-    levels = np.array([0.0, 0.4, 0.5, 0.9])
-    for settings_, promised in (
-        ((quick, slow), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9), (9.0, 0.9)]),
-        ((slow, quick, poor), [(0.5, 0.0), (1.0, 0.4), (2.9, 0.4), (3.0, 0.9)]),
-        ((poor, quick), [(0.5, 0.0), (1.0, 0.4), (2.0, 0.4), (9.0, 0.5)]),
-    ):
-        chances = np.zeros((*[2] * len(settings_), 1, len(levels)))
-        for cell in np.ndindex(*chances.shape[:-2]):
-            made = [t.levels[1] for t, there in zip(settings_, cell, strict=True) if there]
-            chances[(*cell, 0, int(np.searchsorted(levels, max(made, default=0.0))))] = 1.0
-        feeds = tuple(table.label for table in settings_)
-        best = Table("best", "", feeds, levels, none, chances, 0.0, rule=Best(True))
-        frontier = divide((*settings_, best))
-        assert frontier.exact
-        assert (np.diff(frontier.budgets) > 0).all()
-        assert (np.diff(frontier.promised) > 0).all()
-        assert [frontier.promise(budget) for budget, _ in promised] == [p for _, p in promised]
-        assert ((frontier.shares > 0).sum(axis=1) == 1).all()
+def set_in(*ways):
+    """A module that is set in one of several ways: (quality, seconds, chance of it) of each."""
+    levels = np.unique([0.0, *(quality for quality, _, _ in ways)])
+    settings_ = [
+        Table(
+            f"m@k={place}",
+            f"m@k={place}",
+            (),
+            np.array([0.0, quality]),
+            np.array([0.0, seconds]),
+            np.array([[1.0, 0.0], [1.0 - chance, chance]]),
+            seconds,
+        )
+        for place, (quality, seconds, chance) in enumerate(ways)
+    ]
+    chances = np.zeros((*[2] * len(ways), 1, len(levels)))
+    for cell in np.ndindex(*chances.shape[:-2]):
+        made = [t.levels[1] for t, there in zip(settings_, cell, strict=True) if there]
+        chances[(*cell, 0, int(np.searchsorted(levels, max(made, default=0.0))))] = 1.0
+    feeds = tuple(table.label for table in settings_)
+    best = Table("best", "", feeds, levels, np.zeros(1), chances, 0.0, rule=Best(True))
+    return (*settings_, best)
+
+
+@pytest.mark.parametrize(
+    ("ways", "steps"),
+    [
+        ([(0.4, 1.0), (0.9, 3.0)], [(1.0, 0.4), (3.0, 0.9)]),
+        ([(0.9, 3.0), (0.4, 1.0), (0.5, 3.0)], [(1.0, 0.4), (3.0, 0.9)]),  # as long, and better
+        ([(0.5, 3.0), (0.4, 1.0)], [(1.0, 0.4), (3.0, 0.5)]),
+        ([(0.4, 1.0), (0.4, 2.0)], [(1.0, 0.4)]),  # as good, and earlier
+        ([(0.4, 1.0), (0.2, 2.0)], [(1.0, 0.4)]),
+    ],
+)
+def test_of_the_settings_of_a_module_the_best_for_each_budget_has_the_time(ways, steps):
+    frontier = divide(set_in(*((*way, 1.0) for way in ways)))
+    assert [*zip(frontier.budgets, frontier.promised, strict=True)] == steps
+    assert ((frontier.shares > 0).sum(axis=1) == 1).all()
+    assert frontier.exact
+
+
+def test_the_settings_of_a_module_are_divided_exactly_if_each_is():
+    with too_many():
+        assert divide(set_in((0.4, 1.0, 1.0), (0.9, 3.0, 1.0))).exact
+        assert not divide(set_in((0.4, 1.0, 1.0), (0.9, 3.0, 0.7))).exact
 
 
 # Several results that share nothing
