@@ -88,7 +88,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     worth = totals[(values > nothing(tables, objective)) & (totals > 0)]
     most = float(costs.total(tables, [np.asarray(table.times[-1]) for table in tables]))
     if len(worth):
-        for budget in np.geomspace(worth.min(), most, BUDGETS):
+        for budget in np.geomspace(float(worth.min()), most, BUDGETS):
             inside = np.flatnonzero(totals <= budget)
             start = moments[inside[np.argmax(values[inside])]]
             found = _exchanged(tables, tuple(int(m) for m in start), float(budget), objective)
