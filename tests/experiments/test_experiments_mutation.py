@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from experiments.benchmarks import mutation
 from experiments.benchmarks.equivalent_mutants import EQUIVALENT
 from experiments.benchmarks.mutants import mutants
-from experiments.benchmarks.soak import slope
+from experiments.benchmarks.soak import Soaked, slope
 
 SOURCE = '''
 """A text that says 1 + 1 < 3."""
@@ -81,3 +81,13 @@ def test_what_only_varies_does_not_rise():
         _, low, high = slope(np.linspace(0.0, 1.0, 300), 250.0 + rng.normal(0.0, 1.0, 300))
         held += low <= 0.0 <= high
     assert held >= 90
+
+
+def test_what_comes_and_goes_is_not_kept_and_what_stays_is():
+    rows = np.zeros((300, 4))
+    rows[:, 0] = np.arange(300)
+    rows[:, 2:] = 8, 2
+    rows[200:, 3] += np.arange(100) % 4 > 0  # more often a spare is being started, in the end
+    assert Soaked(300, 0, rows).grown() == (0, 0)
+    rows[150:, 2] += 1
+    assert Soaked(300, 0, rows).grown() == (1, 0)
