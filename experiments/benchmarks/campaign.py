@@ -97,7 +97,7 @@ def measure(
     progress("synthetic campaigns that stop when they look good")
     figures |= _coverage(2000, seed)
     progress("promises on a machine that is slower")
-    figures |= _calibrated(150 if quick else 400, seed)
+    figures |= _calibrated(*((150, 150) if quick else (400, 1200)), seed)
     return Benchmark("campaign", figures, settings, seed)
 
 
@@ -262,7 +262,7 @@ class _Elsewhere(WorkClock):
         super().spend(module, work * FACTORS.get(module, 1.0) * tail, step)
 
 
-def _calibrated(problems: int, seed: int) -> dict[str, float | int | None]:
+def _calibrated(problems: int, unseen_problems: int, seed: int) -> dict[str, float | int | None]:
     """The greatest error of a promise made from profiles of one machine, ten problems of which
     were run again on another, against the mean on problems never seen, lived there."""
     learned = domains(problems, seed + 1, 32)
@@ -271,7 +271,7 @@ def _calibrated(problems: int, seed: int) -> dict[str, float | int | None]:
     seeds = iter(range(10**6))
     found = calibrate(library, cross, learned, clock=lambda: _Elsewhere(next(seeds)), seed=seed)
     moved, still = compiler.compile(cross, found.library), compiler.compile(cross, library)
-    unseen = domains(problems, seed + 2, 32)
+    unseen = domains(unseen_problems, seed + 2, 32)
     errors: list[float] = []
     without: list[float] = []
     for budget in (0.5, 1.0, 2.0, 4.0):
