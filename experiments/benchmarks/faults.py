@@ -139,6 +139,7 @@ def _missions(
         "missions.count": count,
         "missions.exceptions": len(raised),
         "missions.hangs": len(slow),
+        "missions.internal": endings.get(Ending.INTERNAL.value, 0),
         "missions.repeated": repeated,
         "missions.slowest_s": slowest,
         "missions.leaks": max(0, left) + _children(),

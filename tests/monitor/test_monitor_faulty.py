@@ -66,6 +66,7 @@ def test_the_ledger_of_a_faulty_mission_closes():
     for number in range(30):
         outcome = faulty_missions.live(PROGRAM, faulty_missions.drawn(PROGRAM, number, 0))
         assert outcome.raised == ""
+        assert outcome.ending != Ending.INTERNAL.value
         assert outcome.unclosed == 0
 
 
