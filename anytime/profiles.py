@@ -165,10 +165,7 @@ class Profile:
             each = stratum_weights(points[problems], target, there[problems])
             each = each.reshape(len(some), *there.shape) * alike
             weights[first : first + 64, rows[there]] = each[:, there]
-        total = weights.sum(axis=1, keepdims=True)
-        return np.where(
-            total > 0, weights / np.where(total > 0, total, 1.0), 1 / len(self.recordings)
-        )
+        return weights / weights.sum(axis=1, keepdims=True)  # each problem has a run, so > 0
 
     @cached_property
     def by_problem(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
@@ -324,7 +321,7 @@ class Profile:
         # The envelope that `mean` gives lies above the mean as measured where quality falls.
         envelope = np.maximum(self.mean(times), mean)
         low, high = mean - factor * spread, np.maximum(mean + factor * spread, envelope)
-        return np.clip(low, 0, 1), np.clip(high, 0, 1)
+        return np.maximum(low, 0.0), np.minimum(high, 1.0)
 
     def on(self, machine: Machine) -> Profile:
         """This profile in the seconds of another machine: quality over work stays as it is."""
@@ -341,7 +338,7 @@ class Profile:
     # Pictures
 
     def _horizon(self) -> float:
-        return max(max((run.end[0] for run in self.recordings), default=0.0), 1e-9)
+        return max(1e-9, *(run.end[0] for run in self.recordings))
 
     def __repr__(self) -> str:
         times = np.linspace(0, self._horizon(), 16)

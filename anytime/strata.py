@@ -63,7 +63,9 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
     for corners in (c for n in (1, 2, 3) for c in combinations(range(near.shape[1]), n)):
         shares, inside = _barycentric(away[:, corners, :])
         missed = ((shares[:, :, None] * away[:, corners, :]).sum(axis=1) ** 2).sum(axis=1)
-        cost = 1e6 * missed + np.where(shares > 0, shares * size[:, corners], 0.0).sum(axis=1)
+        with np.errstate(invalid="ignore"):  # 0 · inf, of a corner that is not there nor needed
+            far = np.where(shares > 0, shares * size[:, corners], 0.0).sum(axis=1)
+        cost = 1e6 * missed + far
         better = rows[inside & (cost < best - SAME)]
         found[better] = 0.0
         found[better[:, None], corners] = shares[better]

@@ -59,7 +59,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     """The frontier of a program's divisions of time. [ZR93] §4, in the inverse domain.
 
     Over distributions and exact on the tables' moments where all divisions can be weighed at
-    once (three calls and more), for independent results, and for any number of calls where
+    once (three calls always can), for independent results, and for any number of calls where
     nothing is left to chance. Beyond, pairs of calls exchange their time optimally while the
     others keep theirs, starting from the best of the (min, +) solution for mean qualities and
     the plain divisions (MIN, MAX, equal shares), which it so never falls below. Modules with knobs
@@ -74,7 +74,7 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
         return _merged(tables, parts, objective)
     calls = [place for place, table in enumerate(tables) if table.rule is None]
     cells = math.prod(len(tables[place].times) for place in calls)
-    if len(calls) <= 2 or cells <= ALL:
+    if cells <= ALL:
         fixed = [0] * len(tables)
         return _frontier(tables, *_weighed(tables, fixed, calls, objective), objective)
     (totals, moments, values), proven = _from_mean_levels(tables, objective)
@@ -85,11 +85,11 @@ def divide(tables: Sequence[Table], objective: Objective = EXPECTED) -> Frontier
     totals = np.concatenate([totals, plain[0]])
     moments = np.concatenate([moments, plain[1]])
     values = np.concatenate([values, plain[2]])
-    least = float(totals[values > nothing(tables, objective)].min(initial=np.inf))
+    worth = totals[(values > nothing(tables, objective)) & (totals > 0)]
     most = float(costs.total(tables, [np.asarray(table.times[-1]) for table in tables]))
-    if np.isfinite(least):
-        for budget in np.geomspace(max(least, 1e-6 * most, 1e-12), max(most, 1e-12), BUDGETS):
-            inside = np.flatnonzero(totals <= budget + 1e-12)
+    if len(worth):
+        for budget in np.geomspace(float(worth.min()), most, BUDGETS):
+            inside = np.flatnonzero(totals <= budget)
             start = moments[inside[np.argmax(values[inside])]]
             found = _exchanged(tables, tuple(int(m) for m in start), float(budget), objective)
             totals = np.concatenate([totals, found[0]])
@@ -228,8 +228,9 @@ def _merged(
         rows[1:, list(parts[place])] = own.shares
         ends = (totals[:, None] + budgets).ravel()
         worth = (values[:, None] + gains).ravel()
-        late = (budgets > 0) & (ends.reshape(-1, len(budgets)) > rule.deadlines[place] + 1e-12)
-        kept = _best_first(ends, np.where(late.ravel(), -np.inf, worth), -np.inf)
+        # Who gets no time is never late: what came before ended by an earlier deadline.
+        late = ends > rule.deadlines[place] + 1e-12
+        kept = _best_first(ends, np.where(late, -np.inf, worth), -np.inf)
         before, added = np.divmod(kept, len(budgets))
         totals, values, shares = ends[kept], worth[kept], shares[before] + rows[added]
     kept = values > 1e-9
@@ -244,15 +245,15 @@ def _exchanged(
     calls = [place for place, table in enumerate(tables) if table.rule is None]
     met: list[Divisions] = []
     for _ in range(SWEEPS):
-        before = value
+        before = best
         for pair in itertools.combinations(calls, 2):
             totals, moments, values = _weighed(tables, best, pair, objective)
-            inside = np.flatnonzero(totals <= budget + 1e-12)
+            inside = np.flatnonzero(totals <= budget)
             top = inside[np.argmax(values[inside])]
-            if values[top] > value + 1e-12:
+            if values[top] > value:
                 best, value = tuple(int(m) for m in moments[top]), float(values[top])
             met.append(_undominated(totals, moments, values, -np.inf))
-        if value <= before + 1e-12:
+        if best == before:
             break
     return (
         np.concatenate([totals for totals, _, _ in met]),
@@ -321,8 +322,8 @@ def _best_first(totals: Floats, values: Floats, floor: float) -> NDArray[np.intp
     """Places of the divisions worth more than `floor` and than any as fast, in order of time."""
     order = np.lexsort((-values, totals))
     ordered = values[order]
-    best_before = np.concatenate([[floor], np.maximum.accumulate(ordered)[:-1]])
-    return order[ordered > np.maximum(best_before, floor) + 1e-9]
+    before = np.maximum.accumulate(np.concatenate([[floor], ordered[:-1]]))
+    return order[ordered > before + 1e-9]
 
 
 def _undominated(

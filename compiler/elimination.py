@@ -104,8 +104,7 @@ def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> 
             table = np.moveaxis(step.tables[number], scope.index(bucket.variable), -1)[index]
             costs = table if costs is None else costs + table
         assert costs is not None  # a bucket has members
-        cheapest = costs.argmin(axis=-1)
-        levels[bucket.variable] = cheapest if costs.ndim == 2 else np.full(count, cheapest)
+        levels[bucket.variable] = np.broadcast_to(costs.argmin(axis=-1), (count,))
     return levels
 
 
@@ -171,6 +170,6 @@ def times_to_levels(quality: NDArray[np.intp], times: Floats, levels: int) -> Fl
     compiled to its optimum.
     """
     table = np.full((*quality.shape[:-1], levels), np.inf)
-    for moment in range(len(times) - 1, -1, -1):
+    for moment in reversed(range(len(times))):
         np.put_along_axis(table, quality[..., moment : moment + 1], times[moment], axis=-1)
     return table

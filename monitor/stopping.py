@@ -136,7 +136,7 @@ def _stop(rule: StoppingRule, seconds: Floats, seen: Floats) -> tuple[int, int]:
         if isinstance(answer, Stop):
             if not 0 <= answer.after < math.inf:
                 raise AnytimeError(f"a rule stops after {answer.after} s; it must be >= 0")
-            return _index(seconds, base + answer.after, max(now, 0)), looks
+            return _index(seconds, base + answer.after, 0), looks
         if not answer > 0:
             raise AnytimeError(f"a rule returned {answer}; return seconds > 0, or STOP")
         now = _index(seconds, base + answer, now + 1)
@@ -147,7 +147,7 @@ def _stop(rule: StoppingRule, seconds: Floats, seen: Floats) -> tuple[int, int]:
 
 def _index(seconds: Floats, at: float, least: int) -> int:
     """Index of the first time that is not before `at`, at least `least`, at most the last."""
-    index = int(np.searchsorted(seconds, at - 1e-9 * max(abs(at), 1.0)))
+    index = int(np.searchsorted(seconds, at * (1 - 1e-9)))  # a sum of times may be off by a bit
     return min(max(index, least), len(seconds) - 1)
 
 

@@ -20,6 +20,7 @@ from compiler import CompiledProgram
 from experiments import crossings
 from experiments.benchmarks import (
     faulty_missions,
+    hostile_clients,
     kills,
     link_faults,
     malformed,
@@ -29,6 +30,7 @@ from experiments.benchmarks import (
 from experiments.benchmarks.deadline import CONTRACT, overrun_of_nothing, warm_up
 from experiments.benchmarks.figures import Benchmark, share_interval
 from experiments.benchmarks.misbehaving import MISBEHAVING
+from experiments.benchmarks.nao_rig import Rig
 from monitor.endings import Ending
 from monitor.monitoring import Monitor
 from monitor.policies import constant
@@ -39,6 +41,7 @@ from sensing.vision import Vision
 
 BOUND = 250.0  # ms past its contract in which control is back, whatever an isolated module does
 HOUR = 3600.0  # seconds of a soak, and of mutation, with --full
+HUNG = 10.0  # seconds of a mission, of the processor's time: on a work clock nobody waits
 HALT = 1.0  # seconds after the last sign of life in which a robot stands
 LOUD = 100.0  # ms that an empty loop runs over, above which a trial is repeated
 RUBBISH = (("rubbish", 0.1), ("nothing", 0.1), ("raises", 0.1))
@@ -54,9 +57,10 @@ def measure(
     progress: Callable[[str], None] = lambda message: None,
 ) -> Benchmark:
     """Misbehaving modules, faulty missions, killed writers, failing disks, malformed files, failing
-    links, a soak; with `full` an hour of it, and how many changed programs the tests notice."""
-    trials, lived, floors, killed, files, links = (
-        (60, 200, 60, 5, 1000, 36) if quick else (1000, 2000, 500, 200, 10_000, 500)
+    links, hostile clients, a soak; with `full` an hour of it, and how many changed programs the
+    tests notice."""
+    trials, lived, floors, killed, files, links, clients = (
+        (60, 200, 60, 5, 1000, 36, 200) if quick else (1000, 2000, 500, 200, 10_000, 500, 1000)
     )
     settings: dict[str, Any] = {"not_measured": {}}
     figures: dict[str, float | int | None] = {}
@@ -77,6 +81,8 @@ def measure(
     figures |= _return_bound(trials, settings)
     progress(f"halt: {links} faults of links to a walking robot")
     figures |= _halt(links, seed, settings)
+    progress(f"qi: {clients} connections that speak nonsense, and as many calls")
+    figures |= _qi(clients, seed, settings)
     long = HOUR if full else 20.0 if quick else 120.0
     progress(f"soak: {long:.0f} s of missions in a process of their own")
     figures |= _soak(long, seed, settings)
@@ -111,15 +117,18 @@ def _missions(
     slow: list[int] = []
     unclosed: list[int] = []
     endings: dict[str, int] = {}
+    slowest = 0.0
     files = len(os.listdir("/proc/self/fd")) if os.path.isdir("/proc/self/fd") else 0
     for number in range(count):
-        began = time.perf_counter()
+        began = time.process_time()
         outcome = faulty_missions.live(program, faulty_missions.drawn(program, number, seed))
+        took = time.process_time() - began
+        slowest = max(slowest, took)
         if outcome.raised:
             raised.append(number)
         if outcome.unclosed:
             unclosed.append(number)
-        if time.perf_counter() - began > 10.0:
+        if took > HUNG:
             slow.append(number)
         endings[outcome.ending] = endings.get(outcome.ending, 0) + 1
     left = len(os.listdir("/proc/self/fd")) - files if files else 0
@@ -129,6 +138,8 @@ def _missions(
         "missions.count": count,
         "missions.exceptions": len(raised),
         "missions.hangs": len(slow),
+        "missions.internal": endings.get(Ending.INTERNAL.value, 0),
+        "missions.slowest_s": slowest,
         "missions.leaks": max(0, left) + _children(),
         "missions.unclosed_ledgers": len(unclosed),
     }
@@ -210,6 +221,32 @@ def _halt(count: int, seed: int, settings: dict[str, Any]) -> dict[str, float | 
     }
 
 
+def _qi(count: int, seed: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+    """What hostile clients do to a robot that is served, in real time and in lock-step."""
+    if importlib.util.find_spec("qi") is None:
+        settings["not_measured"]["qi.motions"] = "libqi is not installed: extra nao"
+        return {"qi.motions": None}
+    with Rig(seed) as rig:
+        harms = [
+            hostile_clients.harmed(server, count // 2, count // 2, seed + place)
+            for place, server in enumerate((rig.live(), rig.crowded()))
+        ]
+    waits = np.concatenate([each.waits for each in harms])
+    settings["qi.taken"] = [call for each in harms for call in each.taken]
+    settings["qi.told"] = [error for each in harms for error in each.told]
+    return {
+        "qi.connections": sum(each.connections for each in harms),
+        "qi.calls": sum(each.calls for each in harms),
+        "qi.motions": sum(each.motions for each in harms),
+        "qi.calls_taken": len(settings["qi.taken"]),
+        "qi.paths_told": len(settings["qi.told"]),
+        "qi.served_worst_s": float(waits.max()),
+        "qi.served_p50_s": float(np.quantile(waits, 0.5)),
+        "qi.floor_worst_s": max(max(each.floors) for each in harms),
+        "qi.extra_mb": max(each.grown for each in harms),
+    }
+
+
 def _soak(seconds: float, seed: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
     """What a process does not give back that lives mission after mission."""
     if not os.path.isdir("/proc/self/fd"):
@@ -241,8 +278,7 @@ def _mutation(full: bool, seed: int, settings: dict[str, Any]) -> dict[str, floa
         return {"mutation.killed": None}
     found = list(mutation.tried(HOUR, seed, list(mutation.TARGETS), lambda message: None))
     settings["mutation.survivors"] = [str(each) for each in found if not each.killed]
-    shares = share_interval("mutation.killed", [each.killed for each in found])
-    return {**shares, "mutation.count": len(found)}
+    return mutation.figures(found)
 
 
 def _in_turn() -> Iterator[anytime.Module]:

@@ -23,7 +23,7 @@ import numpy as np
 
 from anytime.errors import AnytimeError
 from anytime.running import seed_of
-from experiments.benchmarks.nao_failures import FLOOR
+from experiments.benchmarks.nao_rig import FLOOR
 from experiments.nao_serving import FaultProxy, ServedNao
 from monitor.robots.nao_body import LinkLostError
 from monitor.robots.naoqi import NaoqiBody

@@ -39,9 +39,10 @@ Change = tuple[str, Callable[[], None], Callable[[], None]]
 
 @dataclass(frozen=True)
 class Mutant:
-    """A module with one change."""
+    """A module with one change. text: of the line that is changed."""
 
     line: int
+    text: str
     change: str
     code: CodeType
 
@@ -51,20 +52,21 @@ def mutants(source: str, path: str) -> Iterator[Mutant]:
 
     source: of a module. path: of its file.
     """
-    tree = ast.parse(source)
+    tree, lines = ast.parse(source), source.splitlines()
     for node in _places(tree):
         for told, change, undo in _changes(node):
             change()
-            yield Mutant(node.lineno, told, compile(tree, path, "exec"))
+            text = lines[node.lineno - 1].strip()
+            yield Mutant(node.lineno, text, told, compile(tree, path, "exec"))
             undo()
 
 
 def _places(node: ast.AST) -> Iterator[Any]:
-    """The nodes that compute: none in annotations, errors, texts, decorators."""
+    """The nodes that compute: none in annotations, errors, texts, decorators, assertions."""
     if isinstance(node, ast.Raise | ast.JoinedStr | ast.Import | ast.ImportFrom):
         return
-    if isinstance(node, ast.Assert):
-        return
+    if isinstance(node, ast.Assert) or (isinstance(node, ast.keyword) and node.arg == "strict"):
+        return  # zip(…, strict=True) asserts that all are of one length
     if isinstance(node, ast.Compare | ast.BinOp | ast.AugAssign | ast.BoolOp | ast.UnaryOp):
         yield node
     if isinstance(node, ast.Constant | ast.Name | ast.Attribute):

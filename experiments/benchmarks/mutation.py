@@ -1,6 +1,7 @@
 """How many changed programs the tests notice: `python -m experiments.benchmarks.mutation`.
 
-Each mutant is run in a fork, with the tests that mirror its file alone; nothing is written.
+Each mutant is run in a fork, with the tests that mirror its file alone; nothing is written. Those
+that `equivalent_mutants` lists are not run and do not count.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import random
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.machinery import ModuleSpec
 from pathlib import Path
 from types import CodeType, ModuleType
 
-from experiments.benchmarks.figures import share_bounds
+from experiments.benchmarks.equivalent_mutants import EQUIVALENT
+from experiments.benchmarks.figures import share_interval
 from experiments.benchmarks.mutants import Mutant, mutants
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,6 +41,7 @@ TARGETS = {
 """What is changed, and the tests that should notice."""
 
 _LOADED = ("numpy", "scipy.stats", "hypothesis", "pytest", "msgspec", "numba")
+_FEW, _FULL = "few", "full"
 _SLACK = 20.0  # seconds beyond three times what the unchanged program takes: then it hangs
 
 
@@ -71,13 +74,14 @@ def tried(
     for name in _LOADED:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
-    all_of = [(name, mutant) for name in targets for mutant in _mutants(name)]
+    _profiles()
+    all_of = [(name, mutant) for name in targets for mutant in counted(name)]
     random.Random(seed).shuffle(all_of)
     progress(f"{len(all_of)} mutants of {len(targets)} modules")
     taken = dict[tuple[str, ...], float]()
     for tests in {TARGETS[name] for name in targets}:
         begun = time.perf_counter()
-        if not _passes(None, None, tests, 600.0):
+        if not _passes(None, None, tests, 600.0, _FULL):
             raise RuntimeError(f"{', '.join(tests)} fail as they are")
         taken[tests] = time.perf_counter() - begun
     until = time.perf_counter() + seconds
@@ -85,23 +89,56 @@ def tried(
         if time.perf_counter() > until:
             return
         tests = TARGETS[name]
-        passes = _passes(name, mutant.code, tests, 3 * taken[tests] + _SLACK)
+        most = 3 * taken[tests] + _SLACK
+        passes = all(_passes(name, mutant.code, tests, most, each) for each in (_FEW, _FULL))
         yield Tried(name, mutant, killed=not passes)
 
 
-def _mutants(name: str) -> Iterator[Mutant]:
+def every(name: str) -> Iterator[Mutant]:
+    """All mutants of a module."""
     path = ROOT / f"{name.replace('.', '/')}.py"
     return mutants(path.read_text(encoding="utf-8"), str(path))
 
 
-def _passes(name: str | None, code: CodeType | None, tests: tuple[str, ...], most: float) -> bool:
+def counted(name: str) -> list[Mutant]:
+    """Those that are not known to be equivalent."""
+    known = EQUIVALENT.get(name, {})
+    return [each for each in every(name) if (each.text, each.change) not in known]
+
+
+def figures(found: Sequence[Tried]) -> dict[str, float | int | None]:
+    """The shares that were noticed: of all, and by package."""
+    shares = share_interval("mutation.killed", [each.killed for each in found])
+    for package in sorted({each.module.partition(".")[0] for each in found}):
+        of_it = [each.killed for each in found if each.module.partition(".")[0] == package]
+        shares |= share_interval(f"mutation.{package}.killed", of_it)
+        shares[f"mutation.{package}.count"] = len(of_it)
+    return {**shares, "mutation.count": len(found)}
+
+
+def _profiles() -> None:
+    """Hypothesis looks for counter-examples as it does in tests, but not for the smallest; first
+    among few examples, where most mutants show."""
+    from hypothesis import Phase, settings
+
+    phases = (Phase.explicit, Phase.generate)
+    every = settings(
+        settings.get_profile("default"), deadline=None, derandomize=True, phases=phases
+    )
+    settings.register_profile(_FULL, every)
+    settings.register_profile(_FEW, every, max_examples=10)
+
+
+def _passes(
+    name: str | None, code: CodeType | None, tests: tuple[str, ...], most: float, profile: str
+) -> bool:
     """Whether tests pass with a module's code in place of its file's, within so many seconds."""
     child = os.fork()
     if child == 0:
         status = 70
         try:
             os.setsid()
-            status = _tested(name, code, tests)
+            status = _tested(name, code, tests, profile)
         finally:
             os._exit(status)
     until = time.perf_counter() + most
@@ -115,7 +152,7 @@ def _passes(name: str | None, code: CodeType | None, tests: tuple[str, ...], mos
     return False
 
 
-def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...]) -> int:
+def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...], profile: str) -> int:
     import pytest
 
     nowhere = os.open(os.devnull, os.O_RDWR)
@@ -127,6 +164,7 @@ def _tested(name: str | None, code: CodeType | None, tests: tuple[str, ...]) -> 
         sys.meta_path.insert(0, _Changed(name, code))
     files = [str(ROOT / "tests" / each) for each in tests]
     options = ["-n", "0", "-q", "-x", "-p", "no:cacheprovider", f"--rootdir={ROOT}"]
+    options += [f"--hypothesis-profile={profile}"]
     options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # loaded before the fork
     return int(pytest.main([*options, *files]))
 
@@ -164,15 +202,12 @@ def main() -> None:
     for each in tried(60 * options.minutes, options.seed, targets, print):
         found.append(each)
         if not each.killed:
-            print(f"survived  {each}", flush=True)
+            print(f"survived  {each}  ({len(found)} tried)", flush=True)
     for name in targets:
         of_it = [each.killed for each in found if each.module == name]
         print(f"{name:22s} {sum(of_it):4d} of {len(of_it)} noticed")
-    killed = sum(each.killed for each in found)
-    low, high = share_bounds(killed, len(found))
-    print(
-        f"mutation.killed {killed / len(found):.3f} ({low:.3f} to {high:.3f}), {len(found)} tried"
-    )
+    for name, figure in figures(found).items():
+        print(f"{name} {figure:.3f}")
 
 
 if __name__ == "__main__":

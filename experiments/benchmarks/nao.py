@@ -153,9 +153,9 @@ def _connection(figures: dict, reasons: dict, seed: int, progress: Callable[[str
         for key in keys:
             figures[key], reasons[key] = None, "qi is not installed (extra nao)"
         return
-    from experiments.benchmarks import nao_failures
+    from experiments.benchmarks import nao_failures, nao_lockstep
 
     progress("lock-step over libqi, and the table of faults")
-    figures["lockstep.identical"] = int(nao_failures.lockstep_identical(seed))
+    figures["lockstep.identical"] = int(nao_lockstep.lockstep_identical(seed))
     handled: Iterable[bool] = nao_failures.failures(seed).values()
     figures["faults.handled"] = float(np.mean(list(handled)))

@@ -6,79 +6,17 @@ Every row is real: libqi on loopback, servers and clients that are processes and
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import math
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from types import TracebackType
-from typing import Self
 
+from experiments.benchmarks.nao_rig import Rig
 from experiments.nao_serving import FaultProxy, ServedNao
 from monitor.robots.nao_body import Action, LinkLostError, NaoBody, Outcome, Reading
-from monitor.robots.nao_scenes import read_scene
 from monitor.robots.naoqi import NaoqiBody
-from monitor.robots.simulated_nao import SimulatedNao
 
-CROWD = """
-[nao]
-posture = "Stand"
-[goal]
-at = [1.0, 0.0]
-[[obstacle]]
-disc = [0.7, 0.05, 0.12]
-[[obstacle]]
-box = [0.0, -1.0, 2.0, 0.2]
-turned = 0.1
-[[obstacle]]
-disc = [-0.4, 1.2, 0.1]
-velocity = [0.05, -0.1]
-from = 2.0
-[[obstacle]]
-disc = [0.3, 0.0, 0.1]
-from = 5.0
-until = 30.0
-"""
-"""Where NAO runs into things."""
-
-WALL = """
-[nao]
-posture = "Stand"
-[goal]
-at = [1.0, 0.0]
-[noise]
-falls = false
-[[obstacle]]
-box = [1.2, 0.0, 0.1, 2.0]
-"""
-"""Where something stands ahead."""
-
-FLOOR = """
-[nao]
-posture = "Stand"
-[goal]
-at = [1.0, 0.0]
-[noise]
-falls = false
-"""
-"""Where nothing stands in the way."""
-
-_FAULTS = (
-    "sonar-nan:1:2",
-    "sonar-zero:2:3",
-    "odometry-jump:5",
-    "odometry-nan:10:10.5",
-    "odometry-nan:11:15",
-    "posture:20:25",
-    "stiffness:30:40",
-    "fall:45:50",
-    "odometry-frozen:60:80",
-    "fall-event:120",
-)
-_RATE = 10.0
 _SEGMENT = 0.3
 _TICK = 0.2  # real seconds that noticing may take beyond what is promised, on a busy machine
 
@@ -97,106 +35,10 @@ while action.poll() is None:
 """A client that walks until it is killed."""
 
 
-class Rig:
-    """The servers of one campaign, started when they are needed, ended with it."""
-
-    def __init__(self, seed: int = 0) -> None:
-        self.seed = seed
-        self._ends = contextlib.ExitStack()
-        self._servers: dict[str, ServedNao] = {}
-        self.kept: list[ServedNao] = []
-
-    def __enter__(self) -> Self:
-        folder = Path(self._ends.enter_context(TemporaryDirectory()))
-        self.crowd = _written(folder / "crowd.toml", CROWD)
-        self.floor = _written(folder / "floor.toml", FLOOR)
-        self.wall = _written(folder / "wall.toml", WALL)
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._ends.close()
-
-    def crowded(self) -> ServedNao:
-        """In lock-step, among obstacles, without a fault."""
-        return self._served("crowd", "--scene", str(self.crowd), "--lockstep")
-
-    def faulty(self) -> ServedNao:
-        """In lock-step, before a wall, with one fault after the other."""
-        faults = [word for fault in _FAULTS for word in ("--fault", fault)]
-        return self._served("faulty", "--scene", str(self.wall), "--lockstep", *faults)
-
-    def live(self) -> ServedNao:
-        """In real time, ten times as fast, on a free floor."""
-        return self._served("live", *self.live_options())
-
-    def live_options(self, port: int = 0) -> tuple[str, ...]:
-        """The options of such a server, to start one's own."""
-        scene = ("--scene", str(self.floor), "--seed", str(self.seed))
-        return *scene, "--rate", str(_RATE), "--port", str(port)
-
-    def keep(self, server: ServedNao) -> ServedNao:
-        """Close it in the end."""
-        self.kept.append(server)
-        return self._ends.enter_context(server)
-
-    def _served(self, name: str, *options: str) -> ServedNao:
-        if name not in self._servers:
-            self._servers[name] = self.keep(ServedNao(*options))
-        return self._servers[name]
-
-
-def lockstep_identical(seed: int = 0) -> bool:
-    """Whether all that can be observed in process and over libqi in lock-step is the same."""
-    with Rig(seed) as rig:
-        return all(identical(rig, commands) for commands in (FREE, COLLIDING))
-
-
-FREE = (("walk", 0.3, 0.1, 0.4), ("walk", -0.2, 0.2, 0.0), ("posture", "Sit"), ("walk", 0.1, 0, 0))
-COLLIDING = (
-    ("walk", 0.9, 0.1, 0.0),
-    ("posture", "Stand"),
-    ("walk", 0.0, -0.9, 0.5),
-    ("posture", "Stand"),
-)
-
-
-def identical(rig: Rig, commands: tuple[tuple[object, ...], ...]) -> bool:
-    """Whether a sequence of commands looks the same in process and over libqi in lock-step."""
-    here = SimulatedNao(read_scene(rig.crowd, seed=rig.seed))
-    there = NaoqiBody(rig.crowded().url, seed=rig.seed, timeout=5.0)
-    with contextlib.closing(there):
-        return observed(here, commands) == observed(there, commands)
-
-
-def observed(nao: NaoBody, commands: tuple[tuple[object, ...], ...], every: float = 0.2) -> str:
-    """A digest of everything that can be observed while commands are carried out."""
-    digest = hashlib.sha256(repr(nao.read()).encode())
-    for command, *arguments in commands:
-        action = getattr(nao, str(command))(*arguments)
-        for _ in range(round(16 / every)):
-            outcome = action.poll()
-            digest.update(repr((nao.now(), nao.read(), outcome)).encode())
-            if outcome is not None:
-                break
-            nao.wait(every)
-    return digest.hexdigest()
-
-
 def failures(seed: int = 0) -> dict[str, bool]:
     """What can go wrong, and whether it ended as it should."""
     with Rig(seed) as rig:
         return {name: handled(rig) for name, handled in FAILURES.items()}
-
-
-def handled(seed: int = 0) -> tuple[int, int]:
-    """How many failures ended as they should, of how many."""
-    results = failures(seed)
-    return sum(results.values()), len(results)
 
 
 def server_killed(rig: Rig) -> bool:
@@ -391,11 +233,6 @@ FAILURES: dict[str, Callable[[Rig], bool]] = {
     )
 }
 """The rows, by name."""
-
-
-def _written(path: Path, text: str) -> Path:
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 @contextlib.contextmanager

@@ -180,6 +180,8 @@ class GridRobot:
     def avoid(self, speed: float) -> None:
         """Walk towards the goal by obstacle avoidance alone, twice as far each time in a row."""
         self._settle()
+        if not self._goals:
+            return  # it has arrived, and who asks does not know yet
         self._avoided += 1
         leash = self.scene.frame * 2.0 ** min(self._avoided, 40)
         goal, touched = self._goals[0], self.belief.touched.copy()

@@ -10,14 +10,19 @@ import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import msgspec
 
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
+from anytime.files import LARGEST
 from monitor.robots.nao_body import Action, LinkLostError, NaoBody, Outcome, Reading
 
 VERSION = 1
 """Of the format."""
+
+Told = TypeVar("Told")
 
 
 class _RecordedAction:
@@ -103,13 +108,12 @@ class _ReplayedAction:
     def poll(self) -> Outcome | None:
         if self._replay.over:
             return self._outcome
-        told = self._replay.next("poll", [self._number])
-        self._outcome = None if told is None else Outcome(told)
+        self._outcome = self._replay.next("poll", [self._number], Outcome | None)
         return self._outcome
 
     def cancel(self) -> None:
         if not self._replay.over:
-            self._replay.next("cancel", [self._number])
+            self._replay.next("cancel", [self._number], None)
 
 
 class Replay:
@@ -117,7 +121,8 @@ class Replay:
 
     It must be called as that one was: the first call that differs raises AnytimeError, and so does
     one behind the end. A clock that is given is advanced by what was waited for.
-    Raises AnytimeError for a file that is no recording.
+    Raises AnytimeError for a file that is no recording, and for a line that is none when it is come
+    to.
     """
 
     def __init__(self, path: Path, clock: Clock | None = None) -> None:
@@ -127,41 +132,43 @@ class Replay:
         self._lines = _lines(path)
         self._count = 1
         header = next(self._lines, None)
-        if not isinstance(header, dict) or header.get("nao_recording") != VERSION:
+        if header is None or header.get("nao_recording") != VERSION:
             raise AnytimeError(f"{path}: not a recording of a NAO, version {VERSION}")
 
     def now(self) -> float:
-        return self.next("now", [])
+        return self.next("now", [], float)
 
     def wait(self, seconds: float) -> None:
-        self.next("wait", [seconds])
+        self.next("wait", [seconds], None)
         if self._clock is not None:
             self._clock.advance(seconds)
 
     def read(self) -> Reading:
-        told = self.next("read", [])
+        told = self.next("read", [], dict[str, Any])
         if "lost" in told:
-            raise LinkLostError(told["lost"])
-        pose, sonars = tuple(told.pop("pose_in_world")), tuple(told.pop("sonars"))
-        return Reading(**told, pose_in_world=pose, sonars=sonars)
+            raise LinkLostError(self._as(told["lost"], str))
+        return self._as(told, Reading)
 
     def walk(self, x: float, y: float, turn: float) -> _ReplayedAction:
-        return _ReplayedAction(self, self.next("walk", [x, y, turn]))
+        return _ReplayedAction(self, self.next("walk", [x, y, turn], int))
 
     def posture(self, name: str) -> _ReplayedAction:
-        return _ReplayedAction(self, self.next("posture", [name]))
+        return _ReplayedAction(self, self.next("posture", [name], int))
 
     def stop(self) -> None:
         if not self.over:
-            self.next("stop", [])
+            self.next("stop", [], None)
 
     def close(self) -> None:
         if not self.over:
-            self.next("close", [])
+            self.next("close", [], None)
             self.over = True
 
-    def next(self, call: str, arguments: list[Any]) -> Any:
-        """What that call gave, if it is the next one of the recording. Raises AnytimeError."""
+    def next(self, call: str, arguments: list[Any], kind: Any) -> Any:
+        """What that call gave, which is of a kind, if it is the next one of the recording.
+
+        Raises AnytimeError.
+        """
         self._count += 1
         asked = f"{call}({', '.join(map(repr, arguments))})"
         line = next(self._lines, None)
@@ -169,14 +176,26 @@ class Replay:
             raise AnytimeError(f"{self._path}: the recording ends before {asked}")
         # compared as they are written: NaN equals NaN there
         if (line.get("call"), line.get("with")) != (call, _plain(arguments)):
-            told = f"{line.get('call')}({', '.join(map(repr, line.get('with') or []))})"
-            raise AnytimeError(f"{self._path}, line {self._count}: recorded {told}, now {asked}")
-        return _lively(line.get("gave"))
+            told, given = line.get("call"), line.get("with")
+            told = f"{told}({', '.join(map(repr, given if isinstance(given, list) else []))})"
+            raise AnytimeError(
+                f"{self._path}, line {self._count}: recorded {told[:200]}, now {asked}"
+            )
+        return self._as(line.get("gave"), kind)
+
+    def _as(self, told: Any, kind: type[Told]) -> Told:
+        try:
+            return msgspec.convert(_lively(told), kind)
+        except (msgspec.ValidationError, TypeError, ValueError, RecursionError) as error:
+            reason = " ".join(str(error).split())
+            raise AnytimeError(f"{self._path}, line {self._count}: {reason}") from None
 
 
-def _lines(path: Path) -> Iterator[Any]:
+def _lines(path: Path) -> Iterator[dict[str, Any]]:
     """The lines of the file; one that a crash cut off is left out."""
     try:
+        if path.stat().st_size > LARGEST:
+            raise AnytimeError(f"{path}: more than {LARGEST} bytes; record a shorter run")
         lines = path.read_text(encoding="utf-8").splitlines()
     except FileNotFoundError:
         raise AnytimeError(f"{path}: no such recording") from None
@@ -185,10 +204,12 @@ def _lines(path: Path) -> Iterator[Any]:
     for number, line in enumerate(lines, 1):
         try:
             told = json.loads(line)
-        except ValueError:
+        except (ValueError, RecursionError):
             if number == len(lines):
                 return
             raise AnytimeError(f"{path}, line {number}: not JSON") from None
+        if not isinstance(told, dict):
+            raise AnytimeError(f"{path}, line {number}: not a recording of a NAO, but {line[:40]}")
         yield told
 
 

@@ -27,7 +27,8 @@ _AT_ONCE = 60.0  # seconds that lock-step lives in one call: meanwhile nobody is
 def _numbers(call: str, *values: Any) -> None:
     """Raises what the caller is told if one is no finite number: anybody may send anything."""
     for value in values:
-        if not isinstance(value, float | int) or not math.isfinite(value):
+        number = isinstance(value, float | int) and not isinstance(value, bool)
+        if not number or not math.isfinite(value):
             raise RuntimeError(f"{call}: needs finite numbers, not {str(value)[:40]!r}")
 
 
@@ -103,6 +104,8 @@ class Memory:
         return value
 
     def getListData(self, keys: list[str]) -> list[Any]:  # noqa: N802
+        if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
+            raise RuntimeError(f"ALMemory::getListData: needs names, not {str(keys)[:40]!r}")
         told = self._stage.live().sonars if self._stage.listened else (0.0, 0.0)
         heard = [NO_ECHO if each == math.inf else each for each in told]
         now = self._stage.memory | dict(zip(SONARS, heard, strict=True))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, Profile
@@ -117,6 +117,21 @@ def test_a_quantile_is_of_a_share(share):
         Profile("see", (), (recording(values=[0.5]),)).quantile(share, 1.0)
 
 
+def test_the_time_to_a_quality_is_that_of_half_of_the_runs_unless_another_share_is_given():
+    halves = [recording(str(i), [0.8], [2.0 * i]) for i in range(1, 5)]
+    profile = Profile("see", (), tuple(halves))
+    assert [profile.time_to(0.8), profile.time_to(0.8, 0.75)] == [4.0, 6.0]
+    assert profile.time_to(0.0, 0.25) == 2.0, "no result is no result of quality 0"
+
+
+@pytest.mark.parametrize("count", [511, 512, 513, 900])
+def test_at_most_512_moments_are_kept_the_first_and_the_last_among_them(count):
+    changes = np.arange(1.0, count)  # and 0, which is always one
+    profile = Profile("see", (), (recording("a", changes / count, changes),))
+    assert len(profile.times) == min(count, 512)
+    assert profile.times[[0, -1]].tolist() == [0.0, count - 1.0]
+
+
 @given(profiles(), qualities, st.floats(0.01, 1))
 def test_the_time_to_a_quality_is_when_that_share_of_runs_has_had_it(profile, quality, share):
     seconds = profile.time_to(quality, share)
@@ -145,6 +160,18 @@ def test_progress_tells_where_runs_with_this_quality_went():
     assert later.mean == pytest.approx(0.8)
 
 
+def test_progress_asks_the_nearest_tenth_of_all_moments_and_eight_at_least():
+    for problems, asked in ((1, 8), (20, 8), (50, 20)):
+        steady = [recording(f"p{i}", np.linspace(0.1, 0.4, 4) + i / 100) for i in range(problems)]
+        later = Profile("see", (), tuple(steady)).progress(0.2, 1.0)
+        assert len(later.values) == min(asked, 4 * problems)
+
+
+def test_in_progress_a_run_speaks_once_however_often_it_registered():
+    often, once = recording("a", [0.5] * 6 + [0.1]), recording("b", [0.7])
+    assert Profile("see", (), (often, once)).progress(0.5, 99.0).mean == pytest.approx(0.4)
+
+
 def test_progress_of_a_profile_that_never_has_a_result_is_no_result():
     assert Profile("see", (), (recording(),)).progress(0.5, 1.0).no_result == 1
 
@@ -162,6 +189,40 @@ def test_the_band_contains_the_mean(profile, times):
         assert (mean <= high + 1e-9).all()
     assert (low <= profile.mean(times, as_measured=True) + 1e-9).all()
     assert ((low >= 0) & (high <= 1)).all()
+
+
+@given(profiles(), st.floats(0, 20), st.floats(1.1, 4))
+@settings(max_examples=20)
+def test_where_the_pace_is_unsure_the_band_holds_all_that_it_may_be(profile, time, unsure):
+    low, high = replace(profile, unsure=unsure).band([time], resamples=50)
+    bands = [profile.band([time * pace], resamples=50) for pace in (1 / unsure, 1.0, unsure)]
+    assert low[0] == min(low[0] for low, _ in bands)
+    assert high[0] == max(high[0] for _, high in bands)
+
+
+def test_the_band_is_narrow_where_the_problems_agree_and_wide_where_they_do_not():
+    apart = [recording(f"p{i}", [0.5, i / 10], features={"x": float(i)}) for i in range(11)]
+    for profile in (Profile("see", (), tuple(apart)), Profile("see", (), tuple(apart)).given(x=3)):
+        low, high = profile.band([1.0, 2.0])
+        assert high - low == pytest.approx([0.0, (high - low)[1]], abs=1e-6)
+        assert high[1] - low[1] > 0.1
+
+
+def test_a_band_of_more_confidence_is_wider_and_covers_so_often():
+    rng = np.random.default_rng(2)
+    widths, covered = [], []
+    for _ in range(60):
+        few = [recording(f"p{i}", [float(rng.random())]) for i in range(30)]
+        bands = [
+            Profile("see", (), tuple(few)).band([1.0], share, resamples=100)
+            for share in (0.5, 0.95)
+        ]
+        widths.append([float(high[0] - low[0]) for low, high in bands])
+        covered.append([low[0] <= 0.5 <= high[0] for low, high in bands])
+    assert all(narrow < wide for narrow, wide in widths)
+    shares = np.mean(covered, axis=0)
+    assert 0.3 < shares[0] < 0.7
+    assert shares[1] > 0.85
 
 
 def test_the_band_narrows_with_problems():
@@ -261,13 +322,43 @@ def test_a_profile_of_no_runs_is_refused():
         Profile("see", (), ())
 
 
+@given(
+    st.sampled_from([("boxes",), ("boxes", "way")]).flatmap(lambda names: profiles(names)),
+    st.integers(0, 2**32),
+)
+@settings(max_examples=15)
+def test_many_conditions_at_once_weigh_as_each_alone(profile, seed):
+    asked = np.random.default_rng(seed).random((130, len(profile.inputs)))
+    together = profile.weights_given(profile.inputs, asked)
+    for place in (0, 63, 64, 65, 127, 128, 129):
+        alone = profile.given(**dict(zip(profile.inputs, asked[place], strict=True))).weights
+        assert together[place] == pytest.approx(alone)
+    assert together.sum(axis=1) == pytest.approx(1)
+
+
+def test_a_feature_counts_by_a_gaussian_as_wide_as_scott_says():
+    """Two problems at 0 and 1: the standard deviation is 1/2, the width 1/2 · 2^(-1/5)."""
+    ends = [recording("a", [1.0], features={"x": 0.0}), recording("b", [0.0], features={"x": 1.0})]
+    profile = Profile("see", (), tuple(ends))
+    mean = profile.given(x=0.0).mean(9)[0]
+    assert (1 - mean) / mean == pytest.approx(np.exp(-0.5 * (2 * 2**0.2) ** 2))
+    assert profile.given(x=0.5).mean(9)[0] == pytest.approx(0.5)
+
+
 # Costs
 
 
 def test_quality_of_a_cost_is_the_cheapest_known_for_the_problem_by_it():
     runs_ = (recording("a", [10.0, 5.0]), recording("b", [8.0]), recording("c", [0.0]))
-    profile = Profile("find", (), runs_, {"a": 5.0, "b": 4.0, "c": 1.0})
-    assert [q.tolist() for q in profile.qualities] == [[0.5, 1.0], [0.5], [1.0]]
+    for least in (1.0, 0.0):  # of what costs nothing the reference may be nothing, too
+        profile = Profile("find", (), runs_, {"a": 5.0, "b": 4.0, "c": least})
+        assert [q.tolist() for q in profile.qualities] == [[0.5, 1.0], [0.5], [1.0]]
+
+
+def test_the_unit_of_a_cost_makes_no_difference():
+    for unit in (1e-6, 1.0, 1e6):
+        profile = Profile("find", (), (recording("a", [4 * unit, 2 * unit]),), {"a": 1 * unit})
+        assert profile.qualities[0] == pytest.approx([0.25, 0.5])
 
 
 def test_a_beaten_reference_gives_no_quality_above_one():
@@ -286,9 +377,38 @@ def test_texts_fit_a_line_and_pictures_are_drawn_for_every_profile(profile, boxe
     assert "<svg" in profile._repr_html_()
 
 
+@pytest.mark.parametrize(("end", "told"), [(0.2, True), (0.84, True), (0.86, False), (0.9, False)])
+def test_the_text_says_when_results_get_worse_and_by_how_much_it_matters(end, told):
+    text = repr(Profile("see", (), (recording("a", [0.9, end]),)))
+    assert "q .9" in text
+    assert (f"then {end:g}".replace("0.", ".") in text) == told
+
+
+def test_the_text_says_how_long_the_runs_were_and_when_there_was_a_first_result():
+    long, short = recording("a", [0.4, 0.9], [1.0, 2.0], end=8.0), recording("a", [], end=3.0)
+    text = repr(Profile("see", (), (short, long)))
+    assert text.startswith("see  ▁▁")
+    assert "in 8.00 s, first 1.00 s" in text
+    assert "1 problems, 2 runs" in text
+    assert "q .40 in 500.0 ms" in repr(Profile("see", (), (recording("a", [0.4], [0.5]),)))
+    assert len(repr(Profile("x" * 200, (), (long,)))) == 100
+
+
+def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good_ones():
+    strata = [recording("a", [b], inputs={"boxes": b}) for b in np.linspace(0, 1, 11)]
+    profile = Profile("find", ("boxes",), tuple(strata))
+    picture = profile.picture()
+    assert all(f"boxes = {level}" in picture for level in (0.1, 0.5, 0.9))
+    assert "boxes = " not in profile.given(boxes=0.5).picture()
+    thirds = [recording("a", [b], inputs={"boxes": b, "way": 1.0}) for b in (1 / 3, 2 / 3)]
+    assert "boxes = 0.37<" in Profile("find", ("boxes",), tuple(thirds)).picture()
+    assert "boxes = " not in Profile("find", ("boxes", "way"), tuple(thirds)).picture()
+
+
 def test_the_text_says_how_many_problems_a_condition_leaves():
     runs_ = tuple(recording(f"p{i}", [0.5], features={"density": float(i)}) for i in range(9))
-    assert "n_eff" in repr(Profile("see", (), runs_).given(density=0.0))
+    text = repr(Profile("see", (), runs_).given(density=0.0))
+    assert "given density=0 | 9 problems, 9 runs (n_eff 3" in text
 
 
 def test_a_distribution_is_what_its_weights_say():
@@ -297,6 +417,10 @@ def test_a_distribution_is_what_its_weights_say():
     assert distribution.no_result == 0.5
     assert np.isnan(distribution.quantile(0.5))
     assert [distribution.quantile(share) for share in (0.6, 0.9, 1.0)] == [0.5, 1.0, 1.0]
+
+
+def test_what_has_no_weight_is_no_quantile():
+    assert Distribution(np.array([0.1, 0.5]), np.array([0.0, 1.0])).quantile(0.0) == 0.5
 
 
 @given(profiles(), st.floats(0.1, 10))

@@ -13,6 +13,7 @@ from compiler.elimination import (
     MIN_PLUS,
     SUM_PRODUCT,
     Factor,
+    all_cheapest_levels,
     cheapest_levels,
     eliminate,
     times_to_levels,
@@ -73,6 +74,12 @@ def test_the_cheapest_levels_reach_the_minimum(network):
         levels = cheapest_levels(steps, dict(zip(keep, kept, strict=True)))
         assert set(levels) == set(sizes)
         assert joined(factors, levels, np.add) == pytest.approx(result.table[kept])
+    if keep:
+        cells = np.indices(result.table.shape).reshape(len(keep), -1)
+        every = all_cheapest_levels(steps, dict(zip(keep, cells, strict=True)))
+        assert {len(each) for each in every.values()} == {result.table.size}
+    else:
+        assert {len(each) for each in all_cheapest_levels(steps, {}).values()} <= {1}
 
 
 def test_the_answer_does_not_depend_on_the_order_of_factors():

@@ -66,6 +66,7 @@ def test_the_ledger_of_a_faulty_mission_closes():
     for number in range(30):
         outcome = faulty_missions.live(PROGRAM, faulty_missions.drawn(PROGRAM, number, 0))
         assert outcome.raised == ""
+        assert outcome.ending != Ending.INTERNAL.value
         assert outcome.unclosed == 0
 
 
@@ -188,6 +189,13 @@ def test_a_disk_that_fails_at_any_call_leaves_the_old_file_or_the_new():
     from experiments.benchmarks import kills
 
     assert not any(kills.failing())
+
+
+def test_every_kind_of_file_that_is_spoilt_is_read_when_it_is_whole(tmp_path):
+    from experiments.benchmarks.file_kinds import good_files_are_read
+
+    kinds = list(good_files_are_read(tmp_path))
+    assert {"profile", "schedule", "jsonl", "recording", "lesson", "map", "scen", "pgm"} < {*kinds}
 
 
 def test_hostile_files_are_refused_in_one_line_and_run_no_code():

@@ -4,23 +4,25 @@ Real libqi on 127.0.0.1; servers and clients are processes of their own.
 """
 
 import contextlib
+import json
 import math
 import queue
 import signal
-import socket
 import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, WallClock, WorkClock
 from anytime.machines import Machine
-from experiments.benchmarks import link_faults, nao_failures
-from experiments.benchmarks.nao_failures import COLLIDING, FAILURES, FREE, Rig, identical, observed
+from experiments.benchmarks import hostile_clients, link_faults
+from experiments.benchmarks.nao_failures import FAILURES
+from experiments.benchmarks.nao_lockstep import COLLIDING, FREE, identical, observed
+from experiments.benchmarks.nao_rig import Rig
+from experiments.nao_serving import ServedNao
 from monitor.robots import naoqi_link
 from monitor.robots.nao_addresses import nao_body
 from monitor.robots.nao_body import LYING, LinkLostError, NaoBody, Outcome
@@ -245,6 +247,7 @@ ILL_TYPED = [
     ("ALMotion", "moveTo", (math.nan, 0.0, 0.0)),
     ("ALMotion", "moveTo", (0.0, math.inf, 0.0)),
     ("ALMotion", "moveTo", (None, None, None)),
+    ("ALMotion", "moveTo", (True, 0.0, 0.0)),
     ("ALMotion", "moveTo", (1e9, 0.0, 0.0)),
     ("ALMotion", "moveTo", (1.0, 2.0)),
     ("ALMotion", "fly", (1.0,)),
@@ -274,32 +277,15 @@ def test_calls_that_make_no_sense_move_nothing_and_disturb_nobody(rig):
 
 
 def test_connections_that_speak_nonsense_harm_nobody(rig):
-    magic = bytes.fromhex("42dead42")
-    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as nao:
-        before, port, held = nao.read(), rig.crowded().port, []
-        for number in range(120):
-            nonsense = [
-                np.random.default_rng(number).bytes(100),
-                magic + number.to_bytes(4, "little") + b"\xff" * 40,  # 4 GiB are announced
-                magic[:3],  # and the rest never comes
-                b"",
-            ][number % 4]
-            connection = socket.create_connection(("127.0.0.1", port))
-            with contextlib.suppress(OSError):  # it may hang up before all is said
-                connection.sendall(nonsense)
-            if number % 4 == 2:
-                held.append(connection)
-            else:
-                connection.close()
-        assert nao.read() == before
-        with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as other:
-            assert ended(other, other.walk(0.1, 0.0, 0.0)) is Outcome.DONE
-        for connection in held:
-            connection.close()
+    harm = hostile_clients.harmed(rig.crowded(), connections=100, calls=100, seed=0)
+    assert harm.motions == 0
+    assert harm.taken == harm.told == []
+    with contextlib.closing(NaoqiBody(rig.crowded().url, seed=0, timeout=5.0)) as good:
+        assert ended(good, good.walk(0.1, 0.0, 0.0)) is Outcome.DONE
 
 
 def test_a_server_ends_on_ctrl_c(rig):
-    server = rig.keep(nao_failures.ServedNao("--lockstep"))
+    server = rig.keep(ServedNao("--lockstep"))
     server.process.send_signal(signal.SIGINT)
     assert server.process.wait(10.0) == 130
 
@@ -522,7 +508,7 @@ def test_a_run_that_differs_from_the_recorded_one_is_told_where(tmp_path):
     replay = Replay(path)
     replay.walk(0.3, 0.0, 0.0)
     replay.read()
-    replay.next("close", [])
+    replay.next("close", [], None)
     with pytest.raises(AnytimeError, match=r"ends before read\(\)"):
         replay.read()
 
@@ -543,6 +529,46 @@ def test_what_is_no_recording_is_refused_and_a_torn_end_is_not(tmp_path):
     with pytest.raises(AnytimeError, match="ends before"):
         replay.read()
     recorder.close()
+
+
+def gave(call, *arguments):
+    return lambda gave: json.dumps({"call": call, "with": arguments, "gave": gave})
+
+
+SEEN = {
+    "time": 0.0,
+    "pose_in_world": [0.0, 0.0, 0.0],
+    "posture": "Stand",
+    "fallen": False,
+    "moving": False,
+    "sonars": [{"float": "nan"}, {"float": "inf"}],
+}
+
+
+def test_a_reading_comes_back_from_a_recording_as_it_was(tmp_path):
+    path = tmp_path / "run.jsonl"
+    path.write_text(f'{{"nao_recording": 1}}\n{gave("read")(SEEN)}\n')
+    reading = Replay(path).read()
+    assert reading.pose_in_world == (0.0, 0.0, 0.0)
+    assert math.isnan(reading.sonars[0])
+    assert reading.sonars[1] == math.inf
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("[]", "3", '{"call": 1, "with": 2}', "[" * 5000 + "]" * 5000),
+        *map(gave("read"), (None, 3, [], {}, {"lost": 3}, {**SEEN, "sonars": [1.0]})),
+        *map(gave("read"), ({**SEEN, "fallen": 2}, {**SEEN, "time": "x"})),
+        gave("read")({**SEEN, "time": {"float": []}}),
+    ],
+)
+def test_a_line_that_is_no_call_is_refused_with_its_number(tmp_path, line):
+    path = tmp_path / "run.jsonl"
+    path.write_text(f'{{"nao_recording": 1}}\n{line}\n{gave("now")(0.0)}\n')
+    with pytest.raises(AnytimeError, match="line 2") as refused:
+        Replay(path).read()
+    assert "\n" not in str(refused.value)
 
 
 # Documentation

@@ -7,6 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import anytime
+import compiler
+from anytime import AnytimeError, Machine, Profile, ProfileLibrary
+from anytime.profiles import Recording
 from monitor import Decision, Energy, Mission, Situation, State, Value
 from monitor.calibration import spread_of
 from monitor.inter_frame import (
@@ -117,7 +121,107 @@ def test_pinned_contracts_sense_as_little_or_as_long_as_is_of_use_and_plan_as_th
         assert (np.diff(planning) > 0).all()
         assert planning[0] > 0
         assert planning[-1] <= program.tables[1].times[-1]
-        assert len(planning) > 5
+        assert 5 < len(planning) <= 24
+
+
+@anytime.module()
+def look(image):
+    yield image
+
+
+@anytime.module()
+def match(seen):
+    yield seen
+
+
+@anytime.module()
+def plan(matched):
+    yield matched
+
+
+@compiler.program
+def look_match_plan(image):
+    return plan(match(look(image)))
+
+
+def of_four_problems(name, inputs, times, qualities):
+    """Runs on inputs of quality .4 and 1, whose results are as good as their inputs allow."""
+    seconds, raw = np.array(times), np.array(qualities)
+    none, end = np.full(len(times), np.nan), (9.0, 9.0)
+    return Profile(
+        name,
+        inputs,
+        tuple(
+            Recording(
+                f"p{problem}",
+                name,
+                dict.fromkeys(inputs, given),
+                {},
+                seconds,
+                seconds,
+                given * raw,
+                none,
+                end,
+                True,
+            )
+            for problem in range(4)
+            for given in (0.4, 1.0)
+        ),
+    )
+
+
+def of_three_calls(plans):
+    """A program whose last call has results of these qualities, the first of them at once."""
+    profiles = {
+        "look": of_four_problems("look", (), [1.0, 2.0], [0.4, 1.0]),
+        "match": of_four_problems("match", ("seen",), [0.5, 2.5], [0.5, 0.9]),
+        "plan": of_four_problems("plan", ("matched",), [0.0, 1.5, 2.5], plans),
+    }
+    library = ProfileLibrary(profiles=profiles, machine=Machine("lab"))
+    return compiler.compile(look_match_plan, library)
+
+
+@pytest.fixture(scope="module")
+def three_calls():
+    return of_three_calls([0.5, 0.4, 0.9])
+
+
+def test_of_three_calls_the_last_plans_as_long_as_is_of_use_and_no_longer(three_calls):
+    for extreme in ("min", "max"):
+        contracts = pinned_contracts(three_calls, extreme)
+        assert contracts.labels == ("look", "match", "plan")
+        assert contracts.shares[:, 2].tolist() == [0.0, 2.5]
+        (pinned,) = np.unique(contracts.shares[:, :2], axis=0)
+        assert pinned.tolist() == {"min": [1.0, 0.5], "max": [2.0, 2.5]}[extreme]
+
+
+def test_a_tenth_more_that_reaches_no_later_result_is_worth_nothing(three_calls):
+    contracts = pinned_contracts(three_calls, "min")
+    assert contracts.probes == pytest.approx(np.tile(contracts.efficiency[:, None], 3))
+    # the first plan, at once, is worth .5, and the last .9, each times what was seen and matched
+    assert contracts.efficiency.tolist() == pytest.approx([5 / 9, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("plans", "efficiency"), [([0.9, 0.8, 0.3], [1.0]), ([0.01, 0.01, 0.9], [0.05, 1.0])]
+)
+def test_no_plan_makes_a_frame_longer_than_twentyfold_or_shorter_than_the_best(plans, efficiency):
+    contracts = pinned_contracts(of_three_calls(plans), "min")
+    assert contracts.efficiency.tolist() == pytest.approx(efficiency)
+
+
+def test_unless_it_was_lived_a_second_foreseen_is_a_second():
+    assert Spread() == Spread((0.0,), ((1.0,),))
+
+
+def test_the_contracts_reach_from_the_least_to_the_best_that_was_compiled(three_calls):
+    from experiments import crossings
+
+    for program in (three_calls, crossings.compiled()):
+        budgets = program.frontier.budgets
+        contracts = compiled_contracts(program)
+        assert contracts.seconds[[0, -1]] == pytest.approx(budgets[[0, -1]])
+        assert len(contracts.seconds) == min(len(budgets), 24)
 
 
 def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
@@ -127,6 +231,36 @@ def test_where_driving_takes_longer_than_thinking_better_planning_has_a_price():
     assert prices["plan"] > 0
     fast = replace(MISSION, speeds=(50.0, 50.0))
     assert best_contract(fast, CONTRACTS, RHYTHM, Spread(), state()).why.prices["see"] < 0
+
+
+@pytest.mark.parametrize("to_go", [30.0, 200.0])
+def test_a_price_is_what_a_second_more_for_that_call_would_add(to_go):
+    asked = state(to_go=to_go)
+    decision = best_contract(MISSION, CONTRACTS, RHYTHM, Spread(), asked)
+    row = CONTRACTS.shares.tolist().index([*decision.shares.values()])
+    more = 0.1 * CONTRACTS.seconds[row]
+    for place, label in enumerate(CONTRACTS.labels):
+        shares = CONTRACTS.shares[row] + more * np.eye(2)[place]
+        probes = CONTRACTS.probes[row]
+        alone = Contracts(CONTRACTS.labels, shares[None], probes[[place]], probes[None])
+        gain = best_contract(MISSION, alone, RHYTHM, Spread(), asked).why.net - decision.why.net
+        assert decision.why.prices[label] == pytest.approx(gain / more)
+
+
+def test_a_contract_of_no_time_has_no_prices():
+    none = Contracts(("see",), np.zeros((1, 1)), np.ones(1), np.ones((1, 1)))
+    assert best_contract(MISSION, none, RHYTHM, Spread(), state()).why.prices == {"see": 0.0}
+
+
+def test_the_spread_is_the_one_of_the_time_that_would_be_left_without_it():
+    asked = state()
+    plain = best_contract(MISSION, CONTRACTS, RHYTHM, Spread(), asked)
+    late = best_contract(MISSION, CONTRACTS, RHYTHM, Spread((0.0,), ((1.0, 1.8),)), asked)
+    left = plain.why.seconds
+    for beyond, expected in ((0.99 * left, late), (1.01 * left, plain)):
+        spread = Spread((0.0, beyond), ((1.0,), (1.0, 1.8)))
+        assert best_contract(MISSION, CONTRACTS, RHYTHM, spread, asked) == expected
+    assert late.why.net < plain.why.net
 
 
 @given(st.floats(1, 400), st.floats(1, 50))
@@ -170,6 +304,28 @@ def test_the_change_of_speed_is_the_gain_times_the_deviation(gain, deviation, co
     early = deviation / 2  # nobody can be ahead by more than the half that is left
     ahead = on_course(contract, -early, advertised=0.5, seen=0.1)
     assert keep_course(mission, ahead).speed == pytest.approx(4.0 * (1 - gain * early))
+
+
+def test_a_deviation_counts_no_more_than_a_contract_and_never_stops_the_robot():
+    mission = replace(MISSION, gain=1.0, speeds=(0.1, 100.0))
+    far_behind = on_course(late=3.0, advertised=0.5, seen=0.9)
+    assert keep_course(mission, far_behind).speed == 8.0
+    at_the_goal = replace(
+        on_course(advertised=0.5, seen=0.1), time=0.0, situation=Situation(0.0, 9.0, 0.0)
+    )
+    assert keep_course(mission, at_the_goal).speed == pytest.approx(0.4)
+
+
+def test_the_change_of_speed_stays_within_the_limits():
+    mission = replace(MISSION, gain=1.0, speeds=(3.5, 4.5))
+    assert keep_course(mission, on_course(late=0.9, advertised=0.5, seen=0.9)).speed == 4.5
+    assert keep_course(mission, on_course(late=-0.4, advertised=0.5, seen=0.1)).speed == 3.5
+
+
+def test_a_contract_of_no_time_stands():
+    contract = Decision({"see": 0.0}, 4.0)
+    asked = state(in_hand=4.0, moment="call", contract=contract, advertised=0.5, seen=0.9)
+    assert keep_course(MISSION, asked) is contract
 
 
 def test_who_is_neither_ahead_nor_behind_keeps_course():
@@ -229,3 +385,16 @@ def test_nobody_decides_by_news_before_it_comes():
         for time in (0.0, 19.9, 20.0, 50.0)
     ]
     assert speeds == [1.0, 1.0, 5.0, 5.0]
+
+
+@pytest.mark.parametrize("speed", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_constant_speed_moves(speed):
+    with pytest.raises(AnytimeError, match="speed"):
+        constant({"see": 1.0}, speed)
+
+
+@pytest.mark.parametrize("seconds", [-0.1, float("nan"), float("inf")])
+def test_a_constant_share_is_a_time(seconds):
+    assert constant({"see": 0.0}, 1.0).decision.shares == {"see": 0.0}
+    with pytest.raises(AnytimeError, match="see gets"):
+        constant({"see": seconds}, 1.0)

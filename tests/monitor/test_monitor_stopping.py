@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from anytime.errors import AnytimeError
 from monitor.stopping import (
     STOP,
+    History,
     Runs,
     Stop,
     Task,
@@ -18,6 +19,7 @@ from monitor.stopping import (
     fixed_contract,
     held_out,
     parts,
+    standard_error,
     stop_runs,
 )
 from monitor.stopping_rules import LEARNERS, dynamic_programming, forecast, true_of_seen
@@ -70,6 +72,39 @@ def test_rule_may_stop_later_without_looking():
     stopped = stop_runs(rule, runs, TASK)
     assert set(stopped.seconds) == {7.0}
     assert set(stopped.looks) == {1}
+
+
+def test_who_never_stops_is_stopped_by_the_last_time():
+    stopped = stop_runs(lambda history: 1.0, recorded(), TASK)
+    assert set(stopped.seconds) == {SECONDS[-1]}
+    assert set(stopped.looks) == {len(SECONDS)}
+
+
+def test_who_hardly_goes_on_comes_to_the_next_time():
+    stopped = stop_runs(lambda history: 1e-9, recorded(), TASK)
+    assert set(stopped.looks) == {len(SECONDS)}
+
+
+def test_a_fixed_contract_that_is_asked_late_stops_at_the_same_time_or_at_once():
+    runs = recorded()
+    rule = fixed_contract(runs, TASK)
+    best = rule(History(SECONDS[:0], SECONDS[:0])).after
+    seen = runs.seen[0]
+    assert 3 < best < 27
+    assert rule(History(SECONDS[:3], seen[:3])).after == best - 3.0
+    assert rule(History(SECONDS[:28], seen[:28])).after == 0.0
+
+
+def test_who_stops_at_once_has_what_there_is_first():
+    stopped = stop_runs(lambda history: STOP, recorded(), TASK)
+    assert set(stopped.seconds) == {SECONDS[0]}
+    assert not stopped.looks.any()
+
+
+def test_seconds_count_from_the_last_look():
+    runs = recorded()
+    rule = lambda history: Stop(2.0) if len(history.seconds) else 1.0  # noqa: E731
+    assert set(stop_runs(rule, runs, TASK).seconds) == {3.0}
 
 
 @pytest.mark.parametrize("answer", [0.0, -1.0, float("nan"), Stop(-1.0), Stop(float("inf"))])
@@ -126,12 +161,23 @@ def test_better_rule_is_chosen_and_of_two_equal_ones_the_first():
     assert set(choice.losses) == {"mine", "twin", "fixed"}
 
 
+def test_runs_are_parted_in_ten_unless_told_otherwise():
+    choose(recorded(10), TASK, {"forecast": forecast}, rng=np.random.default_rng(0))
+    with pytest.raises(AnytimeError, match="9 runs in 10 folds"):
+        choose(recorded(9), TASK, {"forecast": forecast}, rng=np.random.default_rng(0))
+
+
 def test_folds_share_the_runs_out():
     folds = parts(23, 5, np.random.default_rng(0).permutation(23))
     assert sorted(np.concatenate(folds)) == list(range(23))
     assert {len(fold) for fold in folds} == {4, 5}
-    with pytest.raises(AnytimeError, match="folds"):
-        parts(3, 5, np.arange(3))
+    assert [len(parts(count, folds, np.arange(count))) for count, folds in ((2, 2), (5, 2))] == [
+        2,
+        2,
+    ]
+    for folds in (0, 1, 4, 5):
+        with pytest.raises(AnytimeError, match="folds"):
+            parts(3, folds, np.arange(3))
 
 
 def test_scale_of_what_is_seen_is_learnt():
@@ -147,8 +193,78 @@ def test_scale_of_what_is_seen_is_learnt():
         (np.zeros(4), np.zeros((2, 4)), "increase"),
         (np.arange(4.0), np.full((2, 4), np.nan), "finite"),
         (np.arange(4.0), np.zeros(4), "same shape"),
+        (np.arange(4.0), np.zeros((2, 2, 4)), "same shape"),
+        (np.arange(4.0), np.zeros((0, 4)), "seconds has shape"),
+        (np.array([0.0, 1.0, 1.0, 2.0]), np.zeros((2, 4)), "increase"),
     ],
 )
 def test_runs_that_do_not_fit_are_refused(seconds, quality, message):
     with pytest.raises(AnytimeError, match=message):
         Runs(seconds, quality, quality)
+
+
+def test_what_was_seen_is_as_much_as_there_was_and_finite():
+    there = np.zeros((2, 4))
+    with pytest.raises(AnytimeError, match="same shape"):
+        Runs(np.arange(4.0), there, np.zeros((2, 3)))
+    one_missing = np.array([[0.0, 0.0, np.nan, 0.0]] * 2)
+    for quality, seen in ((one_missing, there), (there, one_missing)):
+        with pytest.raises(AnytimeError, match="finite"):
+            Runs(np.arange(4.0), quality, seen)
+
+
+@pytest.mark.parametrize("look", [-0.1, float("nan"), float("inf")])
+def test_a_look_costs_a_finite_number(look):
+    with pytest.raises(AnytimeError, match="look"):
+        Task(TASK.utility, look)
+
+
+def patient(unit):
+    """Looks every third of a unit of time, three times, and stops a third later."""
+    return lambda history: unit / 3 if len(history.seconds) < 3 else Stop(unit / 3)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 86400.0, 1e12])
+def test_the_unit_of_time_makes_no_difference(unit):
+    runs = recorded(seconds=unit * np.arange(1, 31) / 3)
+    stopped = stop_runs(patient(unit), runs, TASK)
+    assert set(stopped.looks) == {3}
+    assert set(stopped.seconds) == {runs.seconds[3]}
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_the_unit_of_utility_makes_no_difference_to_what_is_missed(unit):
+    runs = recorded()
+    task = Task(lambda quality, seconds: unit * TASK.utility(quality, seconds))
+    ours, theirs = (stop_runs(lambda history: 3.0, runs, each) for each in (task, TASK))
+    assert ours.loss == pytest.approx(theirs.loss)
+    best = runs.utilities(TASK).max(axis=1)
+    assert theirs.loss * best == pytest.approx(best - theirs.utility)
+
+
+def test_the_standard_error_is_of_a_mean_of_a_sample():
+    assert standard_error(np.array([0.0, 2.0])) == pytest.approx(1.0)
+    assert standard_error(np.array([1.0, 2.0, 3.0, 4.0])) == pytest.approx(np.sqrt(5 / 12))
+
+
+def at_time(seconds):
+    """Learns nothing and stops there."""
+    return lambda runs, task: lambda history: Stop(seconds)
+
+
+@given(st.integers(0, 500), st.integers(0, 29), st.integers(0, 29))
+@settings(max_examples=60)
+def test_a_rule_is_chosen_if_it_is_a_standard_error_better_and_nearly_the_best(seed, one, other):
+    runs = recorded(10, seed)
+    learners = {"one": at_time(SECONDS[one]), "other": at_time(SECONDS[other])}
+    choice = choose(runs, TASK, learners, folds=5, rng=np.random.default_rng(seed))
+    losses = {name: loss.mean() for name, loss in choice.losses.items()}
+
+    def apart(more, less):
+        difference = choice.losses[more] - choice.losses[less]
+        return difference.mean() / max(difference.std(ddof=1) / np.sqrt(10), 1e-12)
+
+    best = min(losses, key=losses.get)
+    nearly = [name for name in losses if apart(name, best) <= 1.0]
+    better = apart("fixed", nearly[0]) >= 1.0
+    assert choice.name == (nearly[0] if better else "fixed")
