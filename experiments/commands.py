@@ -25,7 +25,7 @@ BENCHMARKS = (
     "faults",
     "campaign",
 )
-PARTS = ("zr", "nao")
+PARTS = ("zr", "nao", "rivals")
 
 
 def declare(commands: Any) -> None:
@@ -62,6 +62,9 @@ def declare(commands: Any) -> None:
         "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
     )
     parser.add_argument("--quick", action="store_true", help="at most 10 minutes on 2 cores")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with what the folder of the page has kept"
+    )
     parser.add_argument("--seed", type=natural, default=0, help="of the first draw")
     parser.add_argument(
         "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the page"
@@ -140,6 +143,7 @@ def reproduce(options: argparse.Namespace) -> Answer:
             tuple(dict.fromkeys(options.parts)) or PARTS,
             quick=options.quick,
             seed=options.seed,
+            resume=options.resume,
             output=options.output,
             progress=bar,
         )

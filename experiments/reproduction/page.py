@@ -8,7 +8,20 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from experiments.reproduction.rows import COMMANDS, PAPERS, PART, Row, cell, rows_of, shown, summary
+from experiments.reproduction.rival_table import STYLE, rival_table
+from experiments.reproduction.rows import (
+    BEYOND,
+    COMMANDS,
+    PAPERS,
+    PART,
+    READ,
+    RIVALS,
+    Row,
+    cell,
+    rows_of,
+    shown,
+    summary,
+)
 
 CLAIMED = "what is claimed"
 _KIND = {CLAIMED: "text"}  # columns of words
@@ -36,9 +49,9 @@ def page(told: Mapping[str, Any], folder: Path) -> str:
     parts = [
         '<!doctype html><html lang="en"><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>Both papers' claims beside ours</title><style>{_STYLE}</style>",
+        f"<title>Both papers' claims beside ours</title><style>{_STYLE}{STYLE}</style>",
         f"<h1>Both papers' claims beside ours</h1><p>{escape(summary(told))} {escape(machine)}.",
-        *(escape(cut) for cut in settings["cut"]),
+        *(f"<p>{escape(cut)}" for cut in settings["cut"]),
         "<p>A figure of the paper's own way is judged; ours stands beside it. Of a behaviour it is "
         "the share of the draws that show it, and 95 % must; of a mean, the 95 % interval must "
         "contain what is printed or be better; of a single drawing, what is printed must lie "
@@ -56,12 +69,16 @@ def page(told: Mapping[str, Any], folder: Path) -> str:
                 parts.append(_figure(folder / picture["file"], picture["caption"]))
         if paper == "zr":
             parts += [_sweep(sweep) for sweep in settings["sweeps"]]
+    if settings["comparisons"]:
+        parts.append(f"<h2>{escape(BEYOND)}</h2><p>{escape(READ)}")
+        parts.append(f"<pre>{_command(RIVALS, told)}</pre>")
+        parts.append(rival_table(told))
     return "\n".join(parts) + "\n"
 
 
-def _command(paper: str, told: Mapping[str, Any]) -> str:
+def _command(part: str, told: Mapping[str, Any]) -> str:
     quick = " --quick" if told["settings"]["cut"] else ""
-    return escape(f"{COMMANDS[paper]} --seed {told['seed']}{quick}")
+    return escape(f"{COMMANDS[part]} --seed {told['seed']}{quick}")
 
 
 def _claims(rows: Sequence[Row]) -> str:
