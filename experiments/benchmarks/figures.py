@@ -45,13 +45,13 @@ def share_bounds(successes: int, count: int) -> tuple[float, float]:
     return low, high
 
 
-def median_interval(key: str, values: Sequence[float]) -> Figures:
+def median_interval(key: str, values: ArrayLike) -> Figures:
     """A median as a figure, with its bounds. values: of each repetition, at least one.
 
     The bounds are order statistics, which cover a median at least 95 times in 100 whatever the
     distribution is; of fewer than six repetitions they are the extremes, which cover less often.
     """
-    ordered = np.sort(values)
+    ordered = np.sort(np.asarray(values, float))
     outside = max(1, int(binom.ppf(0.025, len(ordered), 0.5)))
     low, high = ordered[outside - 1], ordered[-outside]
     return {key: float(np.median(ordered)), f"{key}_low": float(low), f"{key}_high": float(high)}
@@ -71,8 +71,9 @@ def ratio_interval(key: str, first: ArrayLike, second: ArrayLike) -> Figures:
 
 def bounded(key: str, value: float | np.ndarray, drawn: ArrayLike) -> Figures:
     """A figure with what 95 % of its resamples lie between; None for what is not finite."""
-    low = np.quantile(drawn, 0.025, method="lower")
-    high = np.quantile(drawn, 0.975, method="higher")
+    seen = np.asarray(drawn, float)
+    low = np.quantile(seen, 0.025, method="lower")
+    high = np.quantile(seen, 0.975, method="higher")
     told = {key: float(value), f"{key}_low": float(low), f"{key}_high": float(high)}
     return {name: number if np.isfinite(number) else None for name, number in told.items()}
 

@@ -141,8 +141,8 @@ def _figure(file: Path, caption: str) -> str:
     svg = re.sub(r'href="#([^"]+)"', rf'href="#{own}-\1"', svg)
     label = f'<svg role="img" aria-label="{escape(caption)}"'
     svg = svg.replace("<svg", label, 1)
-    width = float(re.search(r'width="([\d.]+)pt"', svg)[1])  # matplotlib's
-    broad = ' class="broad"' if width > _BROAD else ""
+    widths = re.findall(r'\bwidth="([\d.]+)pt"', svg)  # of the whole, as matplotlib says it
+    broad = ' class="broad"' if max(map(float, widths), default=0.0) > _BROAD else ""
     return (
         f'<figure{broad}><div class="wide">{svg}</div><figcaption>{escape(caption)}</figcaption>'
         "</figure>"
