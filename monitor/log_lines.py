@@ -34,6 +34,7 @@ class SceneFacts(_Line, frozen=True):
     radius: float
     density: float
     truth: str
+    also: tuple[Cell, ...] = ()
 
 
 class Box(_Line, frozen=True):

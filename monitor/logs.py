@@ -37,7 +37,8 @@ class Floor:
     """Where a mission takes place, for the log and its page.
 
     free: bool [rows, columns], the truth. start, goal: (row, column). radius: of sensing, in cells.
-    resolution: metres a cell. density: prior probability that a cell is blocked.
+    resolution: metres a cell. density: prior probability that a cell is blocked. also: further
+    goals.
     """
 
     free: NDArray[np.bool_]
@@ -46,6 +47,7 @@ class Floor:
     radius: float
     resolution: float = 1.0
     density: float = 0.2
+    also: tuple[Cell, ...] = ()
 
     @property
     def step(self) -> int:
@@ -306,7 +308,7 @@ def _scene(floor: Floor) -> dict[str, Any]:
         "radius": floor.radius,
         "density": floor.density,
         "truth": _text(np.packbits(thin)),
-    }
+    } | ({"also": floor.also} if floor.also else {})
 
 
 def _thinned(grid: NDArray[Any], step: int) -> NDArray[Any]:

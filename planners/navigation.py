@@ -18,6 +18,7 @@ from planners.avoidance import Walk, walk
 from planners.multipath import MultiPath
 from planners.paper_atp import HIGHEST_LEVEL, steps
 from planners.path_finding import Cell, Path, astar, route
+from planners.touring import shortest_tour
 from sensing import Belief, SensedMap
 from sensing.sensed_maps import disc
 
@@ -37,6 +38,8 @@ class Place:
     """Where the next frame begins, and what is believed of the floor before looking again.
 
     start, goal: cells. frame: length of a frame in cells. radius: of the sensed disc around `seen`.
+    later: further goals, to be visited after `goal`. beyond: believed length of the way from `goal`
+    through them, in cells; None while the order of all the goals is to be chosen.
     """
 
     belief: Belief
@@ -45,23 +48,33 @@ class Place:
     seen: Cell
     radius: int
     frame: float
+    later: tuple[Cell, ...] = ()
+    beyond: float | None = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class FramePlan:
     """A plan for one frame.
 
-    plan: from `start` to `sub_goal`, on the way to `goal`. route_left: believed length from the
-    sub-goal to the goal, in cells. belief: what was believed when it was made. length: believed
-    length of the frame itself.
+    plan: from `start` to `sub_goal`, on the way to `goal` and then to those `later`, in this order.
+    to_goal: believed length from the sub-goal to the goal; beyond: from there through the later
+    ones, both in cells. belief: what was believed when it was made. length: believed length of the
+    frame itself.
     """
 
     plan: MultiPath
     start: Cell
     sub_goal: Cell
     goal: Cell
-    route_left: float
+    to_goal: float
     belief: Belief
+    later: tuple[Cell, ...] = ()
+    beyond: float = 0.0
+
+    @property
+    def route_left(self) -> float:
+        """Believed length of all that is left after the frame, in cells."""
+        return self.to_goal + self.beyond
 
     @property
     def length(self) -> float:
@@ -75,7 +88,7 @@ class FramePlan:
 
 @dataclass(frozen=True, eq=False)
 class NoWay:
-    """The proof that no way leads to the goal over everything not touched and found blocked."""
+    """The proof that no way leads to a goal over everything not touched and found blocked."""
 
 
 def travel_cost(belief: Belief) -> NDArray[np.uint8]:
@@ -113,7 +126,8 @@ def plan_frame(
 ) -> Iterator[tuple[float, FramePlan | NoWay | None]]:
     """Plan a frame in steps of (work, a better plan or None).
 
-    weight: of the search for the route across the whole map, >= 1.
+    weight: of the search for the route across the whole map, >= 1. Where the order of several
+    goals is to be chosen, it is chosen first: the shortest tour on what is now believed.
 
     Work counts node expansions, with 1/256 for every cell summed.
     """
@@ -121,8 +135,15 @@ def plan_frame(
     if sensed is not None:
         belief.update(sensed)
     cost = travel_cost(belief)
-    blocked = cost[place.goal] == IMPASSABLE or cost[place.start] == IMPASSABLE
-    way = None if blocked else route(cost, place.start, place.goal, weight)
+    goals, beyond, way = (place.goal, *place.later), place.beyond, None
+    spent = 0.0
+    if all(cost[cell] != IMPASSABLE for cell in (place.start, *goals)):
+        if beyond is not None:
+            way = route(cost, place.start, place.goal, weight)
+            spent = float(way.expansions) if way else 0.0
+        elif tour := shortest_tour(cost, place.start, goals, weight):
+            goals, beyond, way = tour.goals, tour.beyond, tour.first
+            spent = float(tour.expansions)
     if way is None:
         yield 0.0, NoWay()
         return
@@ -134,13 +155,19 @@ def plan_frame(
     cut = slice(top, bottom), slice(side, right)
     domain = 1.0 / (1.0 + np.exp(-belief.log_odds[cut]))
     np.copyto(domain, ~belief.touched_blocked[cut] * np.float32(-1) + 1, where=belief.touched[cut])
-    spent = float(way.expansions)
     start = place.start[0] - top, place.start[1] - side
     for step in steps(domain, start, (end[0] - top, end[1] - side)):
         plan = None
         if step.plan is not None:
             plan = FramePlan(
-                _moved(step.plan, top, side), place.start, end, place.goal, left, belief
+                _moved(step.plan, top, side),
+                place.start,
+                end,
+                goals[0],
+                left,
+                belief,
+                goals[1:],
+                beyond or 0.0,
             )
         yield step.work + spent, plan
         spent = 0.0
@@ -186,8 +213,8 @@ def frame_quality(frame: FramePlan | NoWay, problem: FrameProblem) -> float:
         return 0.0
     walked = follow(problem.free, frame, problem.place.start)
     row, column = (int(at) for at in walked.cells[-1])
-    before = astar(problem.free, problem.place.start, problem.place.goal)
-    after = astar(problem.free, (row, column), problem.place.goal)
+    before = astar(problem.free, problem.place.start, frame.goal)
+    after = astar(problem.free, (row, column), frame.goal)
     if before is None or after is None:
         return 0.0
     if walked.length == 0:

@@ -262,7 +262,8 @@ def random_tables(program: Program, rng: np.random.Generator) -> tuple[Table, ..
         reached[..., 0] = 0
         for axis in range(len(shape)):
             reached[(slice(None),) * axis + (0,)] = 0  # no input, no result
-        levels = np.concatenate([[0.0], np.sort(rng.random(count - 1)).round(3)])
+        drawn = rng.choice(1000, count - 1, replace=False)  # no two levels are the same quality
+        levels = np.concatenate([[0.0], np.sort(drawn) / 1000])
         chances = (reached[..., None] == np.arange(count)).astype(float)
         made[node.label] = Table(
             node.label, node.module.name, feeds, levels, times, chances, 1.0, arms[node.label]

@@ -18,6 +18,7 @@ from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_news import news_figures
 from experiments.benchmarks.monitor_traces import trace_figures
+from experiments.benchmarks.monitor_visits import visit_figures
 from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
 from monitor.certainty import resolve
 from monitor.decision_process import DecisionProcess, Moment
@@ -48,6 +49,7 @@ DECISIONS = 100_000
 _PARTS = 20  # into which they are divided, in their order, for an interval
 TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
 NEWS = 60  # missions in which a deadline becomes known
+VISITS = 60  # rounds through several goals
 
 
 def measure(
@@ -103,6 +105,8 @@ def measure(
     figures |= knob_figures(seed)
     progress("a deadline that becomes known on the way")
     figures |= news_figures(seed, NEWS if not quick else QUICK_TRIALS)
+    progress("a round through several goals")
+    figures |= visit_figures(seed, VISITS if not quick else QUICK_TRIALS)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
     folder = traces or trace_folder()

@@ -74,8 +74,9 @@ function drawMap() {
   dot(scene.start, 3, "#fff", INK);
   dot(there, 3.5, "#fff", "#0072b2");
   dot(here, 6, "#0072b2", "#fff");
-  star(pen, x(scene.goal[1]), y(scene.goal[0]), 8 * ratio, ratio);
-  canvas.setAttribute("aria-label", `Map, frame ${at}: robot at row ${here[0]}, column ${here[1]}, goal at row ${scene.goal[0]}, column ${scene.goal[1]}`);
+  for (const [row, column] of scene.goals) star(pen, x(column), y(row), 8 * ratio, ratio);
+  const goals = scene.goals.map(([row, column]) => `goal at row ${row}, column ${column}`);
+  canvas.setAttribute("aria-label", `Map, frame ${at}: robot at row ${here[0]}, column ${here[1]}, ${goals.join(", ")}`);
 }
 function star(pen, x, y, size, ratio) {
   pen.lineWidth = 2 * ratio; pen.strokeStyle = "#fff"; pen.fillStyle = "#009e73";

@@ -61,7 +61,7 @@ function drawMotion(canvas, pen, unit, ratio) {
   pen.beginPath();
   for (const [ahead, aside] of [[.92, 0], [-.35, .5], [-.1, 0], [-.35, -.5]]) pen.lineTo(...tip(ahead, aside));
   pen.closePath(); pen.fillStyle = BLUE; pen.fill();
-  const goal = now.goal ?? [scene.goal[0] + .5, scene.goal[1] + .5];
+  const goal = now.goal ?? [scene.goals[0][0] + .5, scene.goals[0][1] + .5];
   star(pen, x(goal[1]), y(goal[0]), 9 * ratio, ratio);
   for (const each of seen) for (const [, what] of each.events) {
     const [top, left] = each.track[each.track.length - 1], size = 6 * ratio;

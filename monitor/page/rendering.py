@@ -131,7 +131,7 @@ def _scene(log: Log) -> dict[str, Any] | None:
         "step": scene.step,
         "resolution": scene.resolution,
         "start": scene.start,
-        "goal": scene.goal,
+        "goals": [scene.goal, *scene.also],
         "radius": scene.radius,
         "density": scene.density,
         "truth": scene.truth,

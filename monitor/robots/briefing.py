@@ -207,7 +207,14 @@ class Briefing:
             heard = None if faults is None else listen
             return monitor.run(self.grid.mission, robot, seed=seed, listen=heard)
         scene = self.grid.scene
-        floor = Floor(scene.free, scene.start, scene.goal, scene.radius, density=scene.density)
+        floor = Floor(
+            scene.free,
+            scene.start,
+            scene.goal,
+            scene.radius,
+            density=scene.density,
+            also=scene.also,
+        )
         with LogWriter(log) as writer:
             writer.mission(
                 self.grid.mission,
@@ -271,7 +278,7 @@ def _described(grid: GridMission, program: CompiledProgram, effort: Effort) -> b
     """All that the missions before a mission depend on, but for the code."""
     scene, frontier = grid.scene, program.frontier
     words = (grid.mission, grid.machine, effort, program.labels, scene.free.shape, scene.start)
-    more = (scene.goal, scene.radius, scene.frame, scene.device, scene.density)
+    more = (scene.goals, scene.radius, scene.frame, scene.device, scene.density)
     arrays = (scene.free, frontier.budgets, frontier.shares, frontier.promised)
     return repr((words, more)).encode() + b"".join(array.tobytes() for array in arrays)
 

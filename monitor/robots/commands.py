@@ -20,7 +20,9 @@ def declare(commands: Any) -> None:
     parser.add_argument("mission", type=Path, metavar="MISSION.toml", help="or a NAO's SCENE.toml")
     parser.add_argument("--map", type=Path, metavar="FILE", help="another floor (.map or .yaml)")
     parser.add_argument("--start", type=_cell, metavar="ROW,COLUMN", help="row 0 is the top")
-    parser.add_argument("--goal", type=_cell, metavar="ROW,COLUMN")
+    parser.add_argument(
+        "--goal", type=_cell, action="append", metavar="ROW,COLUMN", help="again for each to visit"
+    )
     parser.add_argument("--scenario", type=natural, metavar="N", help="the N-th of FILE.scen")
     parser.add_argument("--seed", type=natural, default=0, help="of the mission (default 0)")
     parser.add_argument(
@@ -111,10 +113,10 @@ def run(options: argparse.Namespace) -> Answer:
         )
     if options.policy not in POLICIES:
         raise AnytimeError(f"no policy {options.policy!r}; there are {', '.join(POLICIES)}")
-    start, goal = options.start, options.goal
+    start, goals = options.start, options.goal or ()
     if options.scenario is not None:
-        start, goal = _ends(options.map, options.scenario)
-    grid = read_mission(options.mission, map_path=options.map, start=start, goal=goal)
+        start, *goals = _ends(options.map, options.scenario)
+    grid = read_mission(options.mission, map_path=options.map, start=start, goals=goals)
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
     with progress("calibrating"):
@@ -261,9 +263,10 @@ def nao_sim(options: argparse.Namespace) -> Answer:
 
 def _wide(grid: GridMission) -> str:
     rows, columns = grid.scene.free.shape
+    goals = ", ".join(map(str, grid.scene.goals))
     return (
         f"{grid.scene.name}, {rows} × {columns} cells, from {grid.scene.start} to "
-        f"{grid.scene.goal}, shortest way {grid.scene.optimal:.1f} cells"
+        f"{goals}, shortest way {grid.scene.optimal:.1f} cells"
     )
 
 

@@ -16,17 +16,28 @@ from monitor.missions import Energy
 from monitor.states import Situation
 from planners.avoidance import Walk, walk
 from planners.multipath import MultiPath
-from planners.navigation import NO_PLAN, FramePlan, NoWay, Place, follow, travel_cost
-from planners.path_finding import Cell, astar, route
+from planners.navigation import (
+    IMPASSABLE,
+    NO_PLAN,
+    ROUTE_WEIGHT,
+    FramePlan,
+    NoWay,
+    Place,
+    follow,
+    travel_cost,
+)
+from planners.path_finding import Cell, route
+from planners.touring import MOST_GOALS, shortest_tour
 from sensing import Belief
 from sensing.vision import Device, Sensor, Vision
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A floor and a way across it.
+    """A floor and what is to be reached on it.
 
-    free: bool [rows, columns], the truth. start, goal: (row, column). radius: of sensing, in cells.
+    free: bool [rows, columns], the truth. start, goal: (row, column). also: further goals; all are
+    to be visited, in whatever order is best. radius: of sensing, in cells.
     frame: length of a frame in cells, at most half the radius. device: what the robot looks with.
     density: prior probability that a cell is blocked.
     """
@@ -39,10 +50,17 @@ class Scene:
     device: Device = field(default_factory=Vision)
     density: float = 0.2
     name: str = "floor"
+    also: tuple[Cell, ...] = ()
 
     def __post_init__(self) -> None:
         rows, columns = self.free.shape
-        for name, (row, column) in (("start", self.start), ("goal", self.goal)):
+        goals = self.goals
+        if len(set(goals)) < len(goals) or len(goals) > MOST_GOALS:
+            raise AnytimeError(
+                f"{len(goals)} goals, {len(set(goals))} of them different; a mission has 1 to "
+                f"{MOST_GOALS} different goals"
+            )
+        for name, (row, column) in (("start", self.start), *(("goal", goal) for goal in goals)):
             if not (0 <= row < rows and 0 <= column < columns):
                 raise AnytimeError(
                     f"{name} ({row}, {column}) is off the map {self.name!r} of {rows} rows and "
@@ -59,14 +77,24 @@ class Scene:
             )
 
     @property
+    def goals(self) -> tuple[Cell, ...]:
+        """All that is to be visited."""
+        return (self.goal, *self.also)
+
+    @property
     def optimal(self) -> float:
-        """Length of the shortest way in cells; inf if there is none."""
-        way = astar(self.free, self.start, self.goal)
-        return float("inf") if way is None else way.length
+        """Length of the shortest way through all goals in cells; inf if there is none."""
+        cost = np.where(self.free, 1, IMPASSABLE).astype(np.uint8)
+        tour = shortest_tour(cost, self.start, self.goals)
+        return float("inf") if tour is None else tour.length
 
 
 class GridRobot:
     """Walks plans by bumping its way along them, and believes what it sensed and touched.
+
+    A goal is visited when a walk ends there. In which order several are visited is chosen when
+    the task is presented and again at each of them, on what is then believed; who plans the frame
+    chooses, and is charged.
 
     It is where the clock says: its place is computed when it is asked for.
     """
@@ -91,15 +119,22 @@ class GridRobot:
         self._interrupted = False
         self._avoided = 0  # times in a row that it went without a plan
         self._fruitless = 0  # frames in a row that touched no new cell
-        self._ending: Ending | None = Ending.REACHED if scene.start == scene.goal else None
+        self._goals = tuple(goal for goal in scene.goals if goal != scene.start)  # not yet visited
+        self._beyond = _unchosen(self._goals)  # length from the first through the rest of them
+        self._ending: Ending | None = None if self._goals else Ending.REACHED
         self._to_go = self._route_from(scene.start)
 
     def inputs(self) -> Mapping[str, Any]:
         self._settle()
         here = self.at()
         start = self._plan.sub_goal if self._plan is not None else here
-        scene = self.scene
-        place = Place(self.belief, start, scene.goal, here, scene.radius, scene.frame)
+        scene, goals, beyond = self.scene, self._goals, self._beyond
+        if goals and goals[0] == start:  # the plan in hand ends there
+            goals, beyond = goals[1:], _unchosen(goals[1:])
+        goal, *later = goals or (start,)
+        place = Place(
+            self.belief, start, goal, here, scene.radius, scene.frame, tuple(later), beyond
+        )
         return {"sensor": Sensor(scene.free, here, scene.radius, scene.device), "place": place}
 
     def situation(self) -> Situation:
@@ -134,8 +169,10 @@ class GridRobot:
         if isinstance(plan, NoWay):
             self._ending = Ending.UNREACHABLE
             return
-        if (plan.start, plan.goal) != (self.at(), self.scene.goal):
+        goals = (plan.goal, *plan.later)
+        if plan.start != self.at() or set(goals) != set(self._goals):
             raise AnytimeError(f"a plan from {plan.start} to {plan.goal} is for another walk")
+        self._goals, self._beyond = goals, plan.beyond
         walk = follow(self.scene.free, plan, self.cell, insist=self._fruitless)
         self._avoided = 0
         self._set_out(plan, walk, speed)
@@ -145,7 +182,7 @@ class GridRobot:
         self._settle()
         self._avoided += 1
         leash = self.scene.frame * 2.0 ** min(self._avoided, 40)
-        goal, touched = self.scene.goal, self.belief.touched.copy()
+        goal, touched = self._goals[0], self.belief.touched.copy()
         cost = travel_cost(self.belief)
         walked = walk(self.scene.free, cost, touched, NO_PLAN, self.cell, goal, leash=leash)
         none = MultiPath(NO_PLAN, np.zeros(1, np.int32), np.zeros(0), leash, 0.0)
@@ -231,15 +268,30 @@ class GridRobot:
         self._fruitless = 0 if fruitful else self._fruitless + 1
         self.cell = int(self._path[-1, 0]), int(self._path[-1, 1])
         self._interrupted = self.cell != plan.sub_goal
-        if self.cell == self.scene.goal:
+        if self.cell in self._goals:
+            self._goals = tuple(goal for goal in self._goals if goal != self.cell)
+            self._beyond = _unchosen(self._goals)
+        if not self._goals:
             self._interrupted = False
             self._ending = Ending.REACHED
         if self._interrupted:
             self._to_go = self._route_from(self.cell)
 
     def _route_from(self, cell: Cell) -> float:
-        way = route(travel_cost(self.belief), cell, self.scene.goal, 2.0)
+        """Believed length of the way through all goals that are left."""
+        if not self._goals:
+            return 0.0
+        cost = travel_cost(self.belief)
+        if self._beyond is None:
+            way = shortest_tour(cost, cell, self._goals, ROUTE_WEIGHT)
+        else:
+            way = route(cost, cell, self._goals[0], ROUTE_WEIGHT)
         if way is None:
             self._ending = self._ending or Ending.UNREACHABLE
             return float("inf")
-        return way.length
+        return way.length + (self._beyond or 0.0)
+
+
+def _unchosen(goals: tuple[Cell, ...]) -> float | None:
+    """What is known of the way beyond the first of these goals before their order is chosen."""
+    return None if len(goals) > 1 else 0.0

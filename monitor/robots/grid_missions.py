@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -64,6 +64,7 @@ class _World(_Section):
     map: str
     start: tuple[int, int] | None = None
     goal: tuple[int, int] | None = None
+    goals: tuple[tuple[int, int], ...] = ()
     radius: int = 32
     frame: float = 16.0
     density: float = 0.2
@@ -100,9 +101,9 @@ def read_mission(
     *,
     map_path: Path | None = None,
     start: Cell | None = None,
-    goal: Cell | None = None,
+    goals: Sequence[Cell] = (),
 ) -> GridMission:
-    """Read a mission; map_path, start and goal replace those of the file.
+    """Read a mission; map_path, start and goals replace those of the file.
 
     The map's path is relative to the mission's file. Raises AnytimeError, in one line with the
     path, for whatever is wrong.
@@ -111,20 +112,24 @@ def read_mission(
     floor = read_map(map_path or path.parent / file.world.map)
     replaced = map_path is not None
     begin = start or (None if replaced else file.world.start)
-    end = goal or (None if replaced else file.world.goal)
-    if begin is None or end is None:
+    if file.world.goal and file.world.goals:
+        raise AnytimeError(f"{path}: world: it has a goal and goals; give one of them")
+    named = file.world.goals or ((file.world.goal,) if file.world.goal else ())
+    ends = tuple(goals) or (() if replaced else named)
+    if begin is None or not ends:
         corners = corner_to_corner(_largest_component(floor.free))
-        begin, end = begin or corners[0], end or corners[1]
+        begin, ends = begin or corners[0], ends or corners[1:]
     try:
         scene = Scene(
             free=floor.free,
             start=begin,
-            goal=end,
+            goal=ends[0],
             radius=file.world.radius,
             frame=file.world.frame,
             device=_device(file.vision),
             density=file.world.density,
             name=floor.name,
+            also=tuple(ends[1:]),
         )
         mission = Mission(
             value=Value(file.value.kind, file.value.worth, file.value.seconds),  # pyright: ignore[reportArgumentType]

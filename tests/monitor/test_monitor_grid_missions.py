@@ -58,6 +58,28 @@ def test_the_camera_can_take_the_place_of_the_papers_sensor(tmp_path):
     assert isinstance(read_mission(written(tmp_path, text)).scene.device, Camera)
 
 
+def test_a_mission_has_one_goal_or_several_to_visit_in_the_best_order(tmp_path):
+    several = GOOD.replace("goal = [148, 228]", "goals = [[148, 228], [98, 56]]")
+    scene = read_mission(written(tmp_path, several)).scene
+    assert scene.goals == ((148, 228), (98, 56))
+    assert scene.optimal > read_mission(shipped.mission_path()).scene.optimal
+    one = read_mission(written(tmp_path, several), goals=[(98, 56)]).scene
+    assert one.goals == ((98, 56),)
+
+
+@pytest.mark.parametrize(
+    ("goals", "told"),
+    [
+        ("goal = [148, 228]\ngoals = [[98, 56]]", "it has a goal and goals; give one of them"),
+        ("goals = [[98, 56], [98, 56]]", "2 goals, 1 of them different"),
+        ("goals = [[98, 56], [0, 0]]", r"goal \(0, 0\) is inside an obstacle"),
+    ],
+)
+def test_goals_that_cannot_be_visited_get_one_line(tmp_path, goals, told):
+    with pytest.raises(AnytimeError, match=told):
+        read_mission(written(tmp_path, GOOD.replace("goal = [148, 228]", goals)))
+
+
 def test_news_is_read_and_a_time_that_is_none_is_refused(tmp_path):
     news = '[news]\nat = 20.0\nkind = "hard"\nworth = 100.0\nseconds = 60.0\n'
     mission = read_mission(written(tmp_path, GOOD + news)).mission

@@ -4,6 +4,7 @@ import hashlib
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -214,3 +215,53 @@ def test_the_same_seed_gives_the_same_bytes_in_two_processes(tmp_path):
         subprocess.run([sys.executable, "-c", script, here, str(log)], check=True)
         digests.append(hashlib.sha256(log.read_bytes()).hexdigest())
     assert digests[0] == digests[1]
+
+
+def corners(size: int = 64) -> Scene:
+    """Four goals near the corners of a floor, named in a bad order."""
+    free = np.ones((size, size), bool)
+    free[size // 3 : 2 * size // 3, size // 2 - 1 : size // 2 + 1] = False
+    near, far = 6, size - 7
+    also = (far, far), (near, far), (far, near)
+    return Scene(free, (size // 2, 6), (near, near), device=Vision(2, 24), also=also)
+
+
+def test_all_goals_are_visited_in_an_order_that_is_nearly_the_shortest():
+    floor = corners()
+    report, robot = live(floor)
+    assert report.ending is Ending.REACHED
+    walked = np.concatenate([np.array(frame.story["path"]) for frame in report.frames])
+    for goal in floor.goals:
+        assert (walked == goal).all(axis=1).any()
+    assert robot.walked < 1.15 * floor.optimal
+    given = sum(
+        Scene(floor.free, start, goal, device=floor.device).optimal
+        for start, goal in pairwise((floor.start, *floor.goals))
+    )
+    assert robot.walked < 0.9 * given
+
+
+def test_several_goals_of_which_one_is_walled_in_are_unreachable():
+    floor = corners(32)
+    free = floor.free.copy()
+    row, column = floor.also[0]
+    free[row - 1 : row + 2, column - 1 : column + 2] = False
+    free[row, column] = True
+    report, _ = live(replace(floor, free=free))
+    assert report.ending is Ending.UNREACHABLE
+
+
+def test_a_robot_that_stands_on_one_of_its_goals_has_visited_it():
+    floor = replace(corners(32), start=corners(32).goal)
+    report, robot = live(floor)
+    assert report.ending is Ending.REACHED
+    assert robot.walked < 1.3 * floor.optimal
+
+
+def test_the_work_of_choosing_an_order_is_charged():
+    floor = scene()
+    aside = tuple(np.argwhere(floor.free[:8, -8:])[0] + (0, 56))
+    one, _ = live(floor)
+    several, _ = live(replace(floor, also=(aside,)))
+    first = [report.frames[0].calls[-1].elapsed for report in (one, several)]
+    assert first[1] > first[0]
