@@ -57,7 +57,9 @@ def declare(commands: Any) -> None:
     parser.add_argument(
         "-o", "--output", type=folder, metavar="DIR", help="for pictures, of those that draw"
     )
-    parser = add_command(commands, "reproduce", reproduce, "the papers' claims beside our figures")
+    parser = add_command(
+        commands, "reproduce", reproduce, "the papers' claims, and rivals, beside our figures"
+    )
     parser.add_argument(
         "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
     )
@@ -126,8 +128,9 @@ def bench(options: argparse.Namespace) -> Answer:
 
 
 def reproduce(options: argparse.Namespace) -> Answer:
-    """Measure what the papers claim, in their way and in ours, and draw it: a table, a page
-    (`reproduce.html`), the same as a document (`results.md`), both from `results.json`.
+    """Measure what the papers claim, in their way and in ours, and every benchmark beside its
+    rivals: a page (`reproduce.html`) and the same as a document (`results.md`), both from
+    `results.json`. What is found is kept in `reproduce.jsonl`, from which `--resume` goes on.
 
     A claim that does not hold is a finding and no failure: the exit code is 0.
     """

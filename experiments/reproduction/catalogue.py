@@ -49,7 +49,7 @@ def _compiler() -> Iterator[Comparison]:
     yield Comparison("compiler", "vs_forward_by_rows", "time to compile a chain of 20 modules",
                      "the time domain, vectorised bytes")  # fmt: skip
     yield Comparison("compiler", "vs_cpsat", "time for all budgets; the rival's for one",
-                     "CP-SAT")  # fmt: skip
+                     "CP-SAT, until its limit")  # fmt: skip
     for rival in ("min", "max"):
         yield Comparison("compiler", f"fig8.unseen_vs_{rival}",
                          "quality on domains never seen, all budgets",

@@ -24,7 +24,8 @@ def drawn(
 
     Made in two processes, which end with this one.
     """
-    missing = [seed for seed in seeds if _name(seed) not in kept]
+    names = {claim.name for claim in claims}
+    missing = [seed for seed in seeds if not names <= set(kept.get(_name(seed)) or ())]
     make = maker("processes:2")
     assert make is not None
     with make() as pool:
@@ -32,7 +33,7 @@ def drawn(
         for done, (seed, draw) in enumerate(zip(missing, made, strict=True), 1):
             kept.keep(_name(seed), draw)
             progress(len(seeds) - len(missing) + done, len(seeds))
-    return [kept[_name(seed)] for seed in seeds]
+    return [kept.get(_name(seed)) for seed in seeds]
 
 
 def verdicts(claim: Claim, way: Way, draws: Sequence[Draw]) -> tuple[Verdict, ...]:

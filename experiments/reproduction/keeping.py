@@ -15,11 +15,7 @@ FILE = "reproduce.jsonl"
 """Beside the page."""
 
 
-class Asked(Stored):
-    """What makes findings comparable; those of something else are not taken for them."""
-
-    claims: list[str]
-    seed: int
+class _About(Stored):
     schema: str = "anytime.reproduction/1"
 
 
@@ -29,17 +25,15 @@ class _Finding(Stored):
 
 
 class Kept:
-    """Findings by name, each what JSON can say."""
+    """Findings by name, each what JSON can say; a name says all that the finding depends on."""
 
     def __init__(self, journal: Journal[_Finding]) -> None:
         self._journal = journal
         self._found: dict[str, Any] = {line.name: line.found for line in journal.kept}
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._found
-
-    def __getitem__(self, name: str) -> Any:
-        return self._found[name]
+    def get(self, name: str) -> Any:
+        """A finding, None if it is not there."""
+        return self._found.get(name)
 
     def keep(self, name: str, found: Any) -> None:
         """Add a finding; it survives the death of this process."""
@@ -48,17 +42,16 @@ class Kept:
 
     def once(self, name: str, find: Callable[[], Any]) -> Any:
         """A finding, made only if it is not there."""
-        if name not in self:
+        if name not in self._found:
             self.keep(name, find())
-        return self[name]
+        return self._found[name]
 
 
 @contextlib.contextmanager
-def opened(folder: Path, asked: Asked) -> Generator[Kept]:
+def opened(folder: Path) -> Generator[Kept]:
     """The findings in a folder, none if it has no file of them.
 
-    Raises AnytimeError for the findings of another reproduction, and while another process
-    writes to them.
+    Raises AnytimeError for what is no such file, and while another process writes to it.
     """
-    with journals.opened(folder / FILE, asked, _Finding) as journal:
+    with journals.opened(folder / FILE, _About(), _Finding) as journal:
         yield Kept(journal)

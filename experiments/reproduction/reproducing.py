@@ -14,7 +14,7 @@ from experiments.benchmarks.figures import Benchmark
 from experiments.reproduction import rivals
 from experiments.reproduction.claims import Claim, Verdict
 from experiments.reproduction.draws import drawn, known, verdicts
-from experiments.reproduction.keeping import FILE, Asked, opened
+from experiments.reproduction.keeping import FILE, opened
 from experiments.reproduction.pictures import Picture
 from experiments.reproduction.rows import SIGNS, bounds, shown
 from experiments.reproduction.sweeps import Sweep
@@ -85,7 +85,7 @@ def measure(
 
     parts: names of files here, which hold `CLAIMS` and `draw`. A draw of all claims is one seed;
     the same seeds serve both ways. What is found is kept beside the page as it comes; resume: go on
-    from there, else it is removed. Raises AnytimeError if what is there was asked otherwise.
+    from there, else it is removed.
     """
     modules = {
         part: importlib.import_module(f"experiments.reproduction.{part}")
@@ -94,11 +94,10 @@ def measure(
     }
     claims = tuple(claim for module in modules.values() for claim in module.CLAIMS)
     count = QUICK_DRAWS if quick else DRAWS
-    asked = Asked(claims=[claim.name for claim in claims], seed=seed)
     form = "quick " if quick else ""
     if not resume:
         (output / FILE).unlink(missing_ok=True)
-    with opened(output, asked) as kept:
+    with opened(output) as kept:
         draws = drawn(claims, range(seed, seed + count), kept, progress) if claims else []
         swept = [
             sweep

@@ -52,7 +52,7 @@ def measured(
     missing: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
     for done, name in enumerate(benchmarks, 1):
-        found = kept.once(f"{form} {name}", lambda name=name: find(name, seed))
+        found = kept.once(f"{form} {name}, seed {seed}", lambda name=name: find(name, seed))
         progress(done, len(benchmarks))
         figures |= {f"{NAME}.{name}.{key}": value for key, value in found["figures"].items()}
         missing |= {f"{NAME}.{name}.{key}": why for key, why in found["not_measured"].items()}

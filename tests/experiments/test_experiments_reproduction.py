@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 
 from anytime.__main__ import main
-from anytime.errors import AnytimeError
 from experiments.reproduction import executions, nao, reproducing, searches
 from experiments.reproduction.claims import ENOUGH, Value, judge
 from experiments.reproduction.draws import drawn
 from experiments.reproduction.executions import AHEAD, execute, surprised
-from experiments.reproduction.keeping import FILE, Asked, opened
+from experiments.reproduction.keeping import FILE, opened
 from experiments.reproduction.ways import OURS, PAPER
 from monitor.robots.nao_noise import NOISELESS
 from planners.nao import STAND
@@ -140,7 +139,7 @@ _DRAWING = """
 from pathlib import Path
 from experiments.reproduction import draws, keeping, nao
 claims = tuple(claim for claim in nao.CLAIMS if claim.name == {name!r})
-with keeping.opened(Path({folder!r}), keeping.Asked(claims=[{name!r}], seed=0)) as kept:
+with keeping.opened(Path({folder!r})) as kept:
     draws.drawn(claims, range(10_000), kept)
 """
 
@@ -156,8 +155,8 @@ def test_one_that_was_killed_goes_on_and_finds_what_an_uninterrupted_one_finds(t
         begun.kill()
     with file.open("a") as torn:
         torn.write('{"name":"draw 99","fou')
-    with opened(tmp_path, Asked(claims=[name], seed=0)) as kept:
-        done = next(seed for seed in range(10_000) if f"draw {seed}" not in kept)
+    with opened(tmp_path) as kept:
+        done = next(seed for seed in range(10_000) if kept.get(f"draw {seed}") is None)
         assert done >= 3
         found = drawn(claims, range(done + 2), kept)
     whole = [
@@ -167,16 +166,21 @@ def test_one_that_was_killed_goes_on_and_finds_what_an_uninterrupted_one_finds(t
     assert found == whole
 
 
-def test_what_is_kept_is_not_found_again_and_other_claims_are_refused(tmp_path):
-    with opened(tmp_path, Asked(claims=["a"], seed=0)) as kept:
+def test_what_is_kept_is_not_found_again(tmp_path):
+    with opened(tmp_path) as kept:
         assert kept.once("bench", lambda: {"figure": 0.1}) == {"figure": 0.1}
-    with opened(tmp_path, Asked(claims=["a"], seed=0)) as kept:
+    with opened(tmp_path) as kept:
         assert kept.once("bench", lambda: pytest.fail("found again")) == {"figure": 0.1}
-    with (
-        pytest.raises(AnytimeError, match="asked is"),
-        opened(tmp_path, Asked(claims=["b"], seed=0)),
-    ):
-        pass
+
+
+def test_a_draw_without_one_of_the_claims_is_made_again(tmp_path):
+    claims = few("prp.collision_on_crossing")
+    with opened(tmp_path) as kept:
+        for seed, claim in enumerate((claims[0].name, "another")):
+            kept.keep(f"draw {seed}", {claim: {"paper": [0.5], "ours": [0.5]}})
+        first, second = drawn(claims, range(2), kept)
+    assert first[claims[0].name]["paper"] == [0.5]
+    assert second[claims[0].name]["paper"] == list(claims[0].draw(1, PAPER))
 
 
 def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp_path, monkeypatch):
