@@ -95,8 +95,9 @@ def told_of(rows):
     }  # fmt: skip
 
 
-def test_page_and_document_name_what_measures_a_row_again_and_say_the_verdict_in_words(tmp_path):
-    rows = [
+@pytest.fixture
+def told_rows():
+    return [
         Comparison("query", "vs_cpp.nao", "ours", "C++").told(
             {"vs_cpp.nao": 1.5, "vs_cpp.nao_low": 1.2, "vs_cpp.nao_high": None}
         ),
@@ -104,7 +105,27 @@ def test_page_and_document_name_what_measures_a_row_again_and_say_the_verdict_in
             {"free.vs_floor": 0.5, "free.vs_floor_low": 0.4, "free.vs_floor_high": 0.6}
         ),
     ]
-    for text in (page(told_of(rows), tmp_path), results(told_of(rows))):
+
+
+def test_page_and_document_name_what_measures_a_row_again_and_say_the_verdict_in_words(
+    told_rows, tmp_path
+):
+    found = told_of(told_rows)
+    for text in (page(found, tmp_path), results(found)):
         for word in ("anytime bench query --seed 7", "▲ better", "▼ worse", "1.2 to —", "C++"):
             assert word in text
         assert "better in 1, worse in 1" in text
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", [380, 1400])
+def test_the_table_fits_its_window(browser, told_rows, tmp_path, width):
+    file = tmp_path / "page.html"
+    file.write_text(page(told_of(told_rows), tmp_path), encoding="utf-8")
+    browser.errors.clear()
+    browser.open(file.as_uri(), width)
+    assert browser.run("document.scrollingElement.scrollWidth <= innerWidth")
+    right = "e => e.getBoundingClientRect().right"  # what may scroll is seen at once, too
+    signs = f"[...document.querySelectorAll('td.better, td.worse')].map({right})"
+    assert max(browser.run(signs)) <= width
+    assert browser.errors == []
