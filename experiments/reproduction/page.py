@@ -96,7 +96,7 @@ def _cut(cut: Sequence[str]) -> str:
 
 
 def _command(part: str, told: Mapping[str, Any]) -> str:
-    quick = " --quick" if told["settings"]["cut"] else ""
+    quick = " --quick" if told["settings"]["quick"] else ""
     return escape(f"{COMMANDS[part]} --seed {told['seed']}{quick}")
 
 

@@ -118,9 +118,10 @@ def measure(
     figures = _figures(judged, missing) | beside.figures
     settings = {
         "parts": list(parts),
+        "quick": quick,
         "draws": count,
         **{name: told for module in modules.values() for name, told in module.settings().items()},
-        "cut": ([CUT] if modules else []) + list(beside.cut) if quick else [],
+        "cut": [*[CUT] * bool(quick and modules), *beside.cut],
         "not_measured": missing,
         "claims": {each.claim.name: each.claim.text for each in judged},
         "sweeps": swept,

@@ -22,7 +22,8 @@ MISSED = 1
 
 @dataclass(frozen=True)
 class Beside:
-    """What the benchmarks found: figures and reasons by dotted names, and the rows as JSON."""
+    """What the benchmarks found: figures and reasons by dotted names, the rows as JSON, and what
+    was left out."""
 
     figures: Figures
     not_measured: dict[str, str]
@@ -51,14 +52,19 @@ def measured(
     figures: Figures = {}
     missing: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
+    cut = list(CUT) if quick and benchmarks else []
     for done, name in enumerate(benchmarks, 1):
         found = kept.once(f"{form} {name}, seed {seed}", lambda name=name: find(name, seed))
         progress(done, len(benchmarks))
         figures |= {f"{NAME}.{name}.{key}": value for key, value in found["figures"].items()}
         missing |= {f"{NAME}.{name}.{key}": why for key, why in found["not_measured"].items()}
-        told = (each.told(found["figures"]) for each in COMPARISONS if each.benchmark == name)
-        rows += [row for row in told if row is not None]
-    return Beside(figures, missing, tuple(rows), CUT if quick and benchmarks else ())
+        for each in (each for each in COMPARISONS if each.benchmark == name):
+            row, why = each.told(found["figures"]), found["not_measured"].get(each.key)
+            if row is not None:
+                rows.append(row)
+            elif why:
+                cut.append(f"{name}: {each.ours} beside {each.rival}: {why}")
+    return Beside(figures, missing, tuple(rows), tuple(cut))
 
 
 def _sampled(name: str, seed: int) -> dict[str, Any]:

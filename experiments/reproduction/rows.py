@@ -24,7 +24,7 @@ BEYOND = "Beyond the papers: every benchmark beside its rivals"
 READ = (
     "Times as good: the rival's time, work or error over ours, or our quality or value over "
     "theirs; above 1 ours is better. ▲ better and ▼ worse: the whole 95 % interval is; "
-    "= equal: no difference is shown."
+    "= equal: no difference is shown. Hindsight, an empty loop and “always” cannot be beaten."
 )
 SIGNS = {"better": "▲ better", "equal": "= equal", "worse": "▼ worse"}
 

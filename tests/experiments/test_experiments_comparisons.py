@@ -88,7 +88,8 @@ def told_of(rows):
     return {
         "figures": {"claims": {"total": 0, "held": 0}},
         "settings": {
-            "cut": [], "claims": {}, "comparisons": rows, "pictures": [], "sweeps": [],
+            "quick": False, "cut": [], "claims": {},
+            "comparisons": rows, "pictures": [], "sweeps": [],
         },
         "machine": {"python": "3", "system": "any"},
         "seed": 7,
