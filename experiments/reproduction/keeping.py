@@ -7,6 +7,8 @@ from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from anytime import journals
 from anytime.files import Stored
 from anytime.journals import Journal
@@ -37,14 +39,21 @@ class Kept:
 
     def keep(self, name: str, found: Any) -> None:
         """Add a finding; it survives the death of this process."""
-        self._journal.append(_Finding(name=name, found=found))
-        self._found[name] = found
+        # as one that goes on will read it, so that both find the same
+        plain = msgspec.json.decode(msgspec.json.encode(found, enc_hook=_number))
+        self._journal.append(_Finding(name=name, found=plain))
+        self._found[name] = plain
 
     def once(self, name: str, find: Callable[[], Any]) -> Any:
         """A finding, made only if it is not there."""
         if name not in self._found:
             self.keep(name, find())
         return self._found[name]
+
+
+def _number(value: Any) -> float | int:
+    """One of numpy's as Python's own. Raises AttributeError for what is no number."""
+    return value.item()
 
 
 @contextlib.contextmanager

@@ -16,8 +16,7 @@ from experiments.reproduction.keeping import Kept
 from experiments.reproduction.samples import CUT, SAMPLES
 
 NAME = "rivals"
-MISSED = 1
-"""Exit code of a benchmark that measured what is not good enough."""
+_MISSED = 1  # exit code of a benchmark that measured what is not good enough
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def _benched(name: str, seed: int) -> dict[str, Any]:
     """The standard form of a benchmark, in a process of its own: some count what theirs holds."""
     words = [sys.executable, "-m", "anytime", "bench", name, "--json", "--seed", str(seed)]
     ran = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=False)
-    if ran.returncode not in (0, MISSED):
+    if ran.returncode not in (0, _MISSED):
         raise AnytimeError(
             f"anytime bench {name} ended with {ran.returncode}; what is done is kept, --resume "
             "goes on from there"

@@ -167,10 +167,12 @@ def test_one_that_was_killed_goes_on_and_finds_what_an_uninterrupted_one_finds(t
 
 
 def test_what_is_kept_is_not_found_again(tmp_path):
+    found = {"figure": np.float64(0.1), "count": np.int64(2), "both": (1.5, math.nan)}
+    told = {"figure": 0.1, "count": 2, "both": [1.5, None]}
     with opened(tmp_path) as kept:
-        assert kept.once("bench", lambda: {"figure": 0.1}) == {"figure": 0.1}
+        assert kept.once("bench", lambda: found) == told
     with opened(tmp_path) as kept:
-        assert kept.once("bench", lambda: pytest.fail("found again")) == {"figure": 0.1}
+        assert kept.once("bench", lambda: pytest.fail("found again")) == told
 
 
 def test_a_draw_without_one_of_the_claims_is_made_again(tmp_path):
