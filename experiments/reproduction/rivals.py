@@ -83,15 +83,15 @@ def _benched(name: str, seed: int) -> dict[str, Any]:
         )
     told = json.loads(ran.stdout)
     return {
-        "figures": dict(_flat(told["figures"])),
+        "figures": dict(flat(told["figures"])),
         "not_measured": told["settings"].get("not_measured", {}),
     }
 
 
-def _flat(figures: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
+def flat(figures: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
     """Nested objects as dotted names."""
-    flat: list[tuple[str, Any]] = []
+    found: list[tuple[str, Any]] = []
     for key, value in figures.items():
         name = f"{before}{key}"
-        flat += _flat(value, f"{name}.") if isinstance(value, Mapping) else [(name, value)]
-    return flat
+        found += flat(value, f"{name}.") if isinstance(value, Mapping) else [(name, value)]
+    return found

@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 
 from experiments.benchmarks.figures import median_interval, ratio_interval
 from experiments.commands import BENCHMARKS as ALL
+from experiments.commands import _nested
 from experiments.reproduction.catalogue import BENCHMARKS, COMPARISONS
 from experiments.reproduction.comparisons import Comparison
 from experiments.reproduction.page import page
 from experiments.reproduction.results import results
+from experiments.reproduction.rivals import flat
 from experiments.reproduction.samples import SAMPLES
 
 READINGS = ("times", "share", "more", "margin", "gap")
@@ -56,6 +58,14 @@ def test_every_benchmark_is_compared_and_no_figure_twice():
     assert set(SAMPLES) <= set(BENCHMARKS)
     keys = [(each.benchmark, each.key) for each in COMPARISONS]
     assert len(set(keys)) == len(keys)
+
+
+_WORDS = st.lists(st.sampled_from("abc"), min_size=3, max_size=3).map(".".join)
+
+
+@given(st.dictionaries(_WORDS, st.one_of(st.none(), st.floats(0, 1))))
+def test_what_a_benchmark_prints_has_its_figures_by_their_names(figures):
+    assert dict(flat(_nested(figures))) == figures
 
 
 @given(st.integers(6, 40), st.integers(0, 2**32))
