@@ -189,11 +189,13 @@ def _shown(value: float | int | None) -> str:
 
 
 def _figures(found: Benchmark) -> dict[str, Any]:
+    from experiments.benchmarks.figures import reasons
+
     machine = {"python": platform.python_version(), "system": platform.platform()}
     return {
         "name": found.name,
         "figures": _nested(found.figures),
-        "settings": dict(found.settings),
+        "settings": {**found.settings, "not_measured": reasons(found)},
         "machine": machine,
         "seed": found.seed,
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,9 @@ from scipy.stats import beta, binom
 
 Figures = dict[str, float | int | None]
 RESAMPLES = 2000
+UNBOUNDED = (
+    "without bound: what it is divided by may be nothing, or the level is not always reached"
+)
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,13 @@ class Benchmark:
     settings: Mapping[str, object] = field(default_factory=dict)
     seed: int = 0
     picture: Callable[[Path], Path] | None = None
+
+
+def reasons(found: Benchmark) -> dict[str, str]:
+    """Why each figure that is None is; an end of an interval that is None has no bound."""
+    told: Any = found.settings.get("not_measured", {})
+    ends = (key for key, value in found.figures.items() if value is None)
+    return {key: UNBOUNDED for key in ends if key.endswith(("_low", "_high"))} | told
 
 
 def share_interval(key: str, held: Sequence[bool]) -> Figures:

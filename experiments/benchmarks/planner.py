@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.benchmarks.figures import Benchmark, Figures, bounded
+from experiments.benchmarks.figures import Benchmark, Figures, bounded, ratio_interval
 from experiments.benchmarks.planner_checks import (
     below_exact,
     overruns,
@@ -193,12 +193,18 @@ def _put_completion(figures: dict[str, float | int | None], raced: dict[str, lis
     everything = [each for found in raced.values() for each in found]
     hard = [each for key, found in raced.items() if key.startswith("hard.") for each in found]
     figures["final.quality"] = min(each.final["atp"] for each in everything)
-    figures["final.work"] = float(np.mean([each.total["atp"] for each in everything]))
+    figures |= _mean_interval("final.work", [each.total["atp"] for each in everything])
     figures["hard.total_work_max"] = max(each.total["atp"] for each in hard)
     random = [each for key, found in raced.items() if key != "maps" for each in found]
     for name, found in (("random", random), ("maps", raced["maps"])):
         first = [each.tracks["atp"][0][0] for each in found]
-        figures[f"first_plan.{name}.work"] = float(np.mean(first)) if first else None
+        key = f"first_plan.{name}.work"
+        figures |= _mean_interval(key, first) if first else {key: None}
+
+
+def _mean_interval(key: str, values: Sequence[float]) -> Figures:
+    """A mean over instances with its interval."""
+    return ratio_interval(key, values, np.ones(len(values)))
 
 
 def against(raced: dict[str, list[Race]]) -> Figures:

@@ -96,9 +96,10 @@ def measure(
     progress("moving peaks")
     _peaks(figures, settings, few, periods=30 if quick else 100)
     progress("a control loop beside the query")
-    figures["control_loop.p95_ratio"] = _control_loop(3 if quick else 7, 2.0)
+    loop = _control_loop(3 if quick else 7, 2.0)
+    figures |= median_interval("control_loop.p95_ratio", loop)
     progress("the start of a process; plain against native")
-    figures["start.cold_over_cached"] = _start(settings)
+    figures |= median_interval("start.cold_over_cached", _start(settings))
     figures["parity.mismatches"] = _parity(range(seed, seed + (200 if quick else 1000)))
     if full:
         progress("ablation")
@@ -286,8 +287,8 @@ def _ours(seed: int, periods: int) -> float:
 # --- Beside a control loop, at the start, and plain against native.
 
 
-def _control_loop(turns: int, seconds: float) -> float:
-    """p95 of the lateness of a 100 Hz loop, beside the query over alone."""
+def _control_loop(turns: int, seconds: float) -> list[float]:
+    """p95 of the lateness of a 100 Hz loop, beside the query over alone, of each turn."""
     searched = Query(plan, sitting(), seed=1)
     searched.step()
     ratios: list[float] = []
@@ -296,7 +297,7 @@ def _control_loop(turns: int, seconds: float) -> float:
         with searched.background():
             beside = _lateness(seconds)
         ratios.append(beside / alone)
-    return float(np.median(ratios))
+    return ratios
 
 
 def _lateness(seconds: float) -> float:
@@ -322,8 +323,9 @@ print(started - begun, time.process_time() - started)
 """
 
 
-def _start(settings: dict) -> float:
-    """CPU-seconds of making the NAO's model native in a new process, over those of loading it.
+def _start(settings: dict) -> np.ndarray:
+    """CPU-seconds of making the NAO's model native in a new process, over those of loading it, of
+    each of three.
 
     What starts the compiler, whatever it then compiles or loads, is told apart, like the imports.
     """
@@ -348,7 +350,7 @@ def _start(settings: dict) -> float:
                 times.append(took)
     seconds = {"cold": cold, "cached": cached, "engine": engine}
     settings["start_seconds"] = {name: float(np.median(found)) for name, found in seconds.items()}
-    return float(np.median(np.array(cold) / np.array(cached)))
+    return np.array(cold) / np.array(cached)
 
 
 def _parity(seeds: Iterable[int]) -> int:

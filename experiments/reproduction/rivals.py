@@ -51,7 +51,7 @@ def measured(
     figures: Figures = {}
     missing: dict[str, str] = {}
     rows: list[dict[str, Any]] = []
-    cut = list(CUT) if quick and benchmarks else []
+    cut: list[str] = [*CUT] if quick and benchmarks else []
     for done, name in enumerate(benchmarks, 1):
         found = kept.once(f"{form} {name}, seed {seed}", lambda name=name: find(name, seed))
         progress(done, len(benchmarks))

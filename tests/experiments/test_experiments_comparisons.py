@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.benchmarks.figures import median_interval, ratio_interval
+from experiments.benchmarks.figures import (
+    UNBOUNDED,
+    Benchmark,
+    median_interval,
+    ratio_interval,
+    reasons,
+)
 from experiments.commands import BENCHMARKS as ALL
 from experiments.commands import _nested
 from experiments.reproduction.catalogue import BENCHMARKS, COMPARISONS
@@ -92,6 +98,13 @@ def test_a_ratio_of_means_has_bounds_unless_the_second_may_be_nothing():
     rare = ratio_interval("a", np.ones(10), np.arange(10) == 0)
     assert rare["a_high"] is None
     assert rare["a_low"] > 1.0
+
+
+def test_whatever_is_none_has_its_reason():
+    figures = ratio_interval("a", [1.0, 1.0], [0.0, 1.0])
+    assert figures["a_high"] is None
+    found = Benchmark("any", {**figures, "b": None}, {"not_measured": {"b": "no time"}})
+    assert reasons(found) == {"a_high": UNBOUNDED, "b": "no time"}
 
 
 def told_of(rows):
