@@ -14,46 +14,30 @@ from anytime import running
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
 from anytime.modules import Module
-from anytime.pictures import duration, figure, line_chart, number
-from anytime.profiles import Profile, Recording
+from anytime.pictures import duration, figure
+from anytime.profiles import Profile
 from anytime.programs import Program, makers
 from anytime.results import Result, Status
-from compiler import baselines
 from compiler.adaptive import ceiling
 from compiler.advising import Advice, advise
+from compiler.allocations import Allocation
 from compiler.calibrating import Calibration, calibrate_by_running
+from compiler.compiled_profiles import profile_of
 from compiler.costs import stretched
-from compiler.division import Floats, Frontier, moments_within, output_chances
+from compiler.division import Floats, Frontier
 from compiler.executing import Execution, Listener, Memory, planned, status_of, unwanted
-from compiler.explaining import Explanation, certificate, decided, explain
+from compiler.explaining import Explanation, decided, explain
 from compiler.guarding import Steps
 from compiler.objectives import EXPECTED, Objective
 from compiler.policies import Plan, Policy
 from compiler.replaying import Replay
+from compiler.showing import picture_of, text_of
 from compiler.storing import save
 from compiler.tables import Table
 from compiler.validating import Validation, lived, validate
 
 if TYPE_CHECKING:
     from compiler.activities import Activity
-
-QUANTILES = 20  # that stand for the distribution of the result in the compiled profile
-
-
-@dataclass(frozen=True)
-class Allocation:
-    """Who gets how much of a budget, and what is expected of it.
-
-    shares: seconds by call; what is left of the budget is the last call's.
-    """
-
-    seconds: float
-    shares: Mapping[str, float]
-    promised: float
-
-    def __repr__(self) -> str:
-        parts = ", ".join(f"{label} {duration(s)}" for label, s in self.shares.items())
-        return f"{duration(self.seconds)}: {parts} → {number(self.promised)}"
 
 
 @dataclass(frozen=True)
@@ -141,34 +125,7 @@ class CompiledProgram:
     @cached_property
     def profile(self) -> Profile:
         """The performance profile of the whole program, by the budget that it is given."""
-        rows: list[Floats] = []
-        for shares in self.frontier.shares:
-            chances = output_chances(self.tables, moments_within(self.tables, shares))
-            rows.append(_quantiles(chances, self.tables[-1].levels))
-        table = np.array(rows)  # [budgets, quantiles], NaN = no result
-        recordings: list[Recording] = []
-        end = float(self.frontier.budgets[-1])
-        means = np.nan_to_num(table).mean(axis=1)
-        lived = self.frontier.promised / np.maximum(means, 1e-9)
-        table = np.clip(table * lived[:, None], 0.0, 1.0)  # so that its mean is the promise
-        for column in range(QUANTILES):
-            there = ~np.isnan(table[:, column])
-            budgets = self.frontier.budgets[there]
-            recordings.append(
-                Recording(
-                    problem=f"quantile {column}",
-                    call=self.name,
-                    inputs={},
-                    features={},
-                    seconds=budgets,
-                    work=budgets,
-                    raw=table[there, column],
-                    estimates=np.full(len(budgets), np.nan),
-                    end=(end, end),
-                    complete=True,
-                )
-            )
-        return Profile(self.name, (), tuple(recordings), machine=self.machine)
+        return profile_of(self.name, self.tables, self.frontier, self.machine)
 
     @cached_property
     def module(self) -> Module:
@@ -389,44 +346,14 @@ class CompiledProgram:
         return np.geomspace(max(self.least, 1e-3 * most, 1e-9), max(most, 1e-9), count).tolist()
 
     def __repr__(self) -> str:
-        width = max(12, *(len(label) + 2 for label in self.labels))
-        header = "".join(f"{label:>{width}}" for label in self.labels)
-        lines = [
-            f"{self.program!r} on machine {self.machine}"[:100],
-            f"{'budget':>10}{header}   promised  95 %",
-        ]
-        for seconds in self._budgets():
-            allocation = self.allocate(seconds)
-            shares = "".join(f"{duration(s):>{width}}" for s in allocation.shares.values())
-            low, high = self.interval(seconds)
-            lines.append(
-                f"{duration(seconds):>10}{shares}   {number(allocation.promised):>8}"
-                f"  [{number(low)}, {number(high)}]"
-            )
-        lines.append(certificate(self.regret))
-        return "\n".join(line[:100] for line in lines)
+        title = f"{self.program!r} on machine {self.machine}"
+        rows = [(self.allocate(each), self.interval(each)) for each in self._budgets()]
+        return text_of(title, rows, self.regret)
 
     def _repr_html_(self) -> str:
         first, last = self._budgets(2)
-        times = np.geomspace(first, last, 80)
-        x = times.tolist()
-        series = {
-            "compiled": (x, [self.promise(t) for t in x]),
-            "MIN": (x, baselines.minimal(self.tables, times).tolist()),
-            "MAX": (x, baselines.maximal(self.tables, times).tolist()),
-        }
-        above = line_chart(
-            series,
-            x_label="budget [s]",
-            y_label="expected quality",
-            dashed=("MIN", "MAX"),
-            title=self.name,
-        )
-        shares = {
-            label: (x, [self.allocate(t).shares[label] / t for t in x]) for label in self.labels
-        }
-        below = line_chart(shares, x_label="budget [s]", y_label="share of the budget")
-        return figure(above + below, repr(self))
+        allocations = [self.allocate(each) for each in np.geomspace(first, last, 80).tolist()]
+        return figure(picture_of(self.name, self.tables, allocations), repr(self))
 
 
 def _check_inputs(program: Program, inputs: Mapping[str, Any]) -> None:
@@ -441,17 +368,3 @@ def _finite(seconds: float) -> float:
     if not seconds > -np.inf or not seconds < np.inf:
         raise AnytimeError(f"a budget of {seconds} s; give a finite number of seconds")
     return float(seconds)
-
-
-def _quantiles(chances: Floats, levels: Floats) -> Floats:
-    """Means of equal slices of a distribution over levels, [QUANTILES]; NaN = no result."""
-    edges = np.concatenate([[0.0], np.cumsum(chances)])
-    edges = edges / edges[-1]
-    slices = np.linspace(0, 1, QUANTILES + 1)
-    overlap = np.clip(
-        np.minimum(edges[1:, None], slices[None, 1:]) - np.maximum(edges[:-1, None], slices[:-1]),
-        0,
-        None,
-    )
-    mean = QUANTILES * (levels @ overlap)
-    return np.where(QUANTILES * overlap[0] > 0.5, np.nan, np.clip(mean, 0.0, 1.0))

@@ -1,12 +1,7 @@
-"""The genetic algorithm over choices: what a call to `rng` does, and how a generation is made.
+"""How a generation of the genetic algorithm is made, and the loop over generations.
 
-[PRP16] §2 and §4, and beyond. A model is executed with the values of a genome; values that it asks
-for and the genome lacks are drawn, so lengths and parameters may vary from run to run. Crossover
-and edits prepare a child's genome before its run; mutation happens inside it, where the parameters
-of the choice are known. What a child inherits and does not ask for stays in its genome, dormant.
-
-All kernels share this file, because numba's cache does not see a callee change in another, and all
-take the address of a query's header alone (header.py).
+[PRP16] §2 and §4, and beyond: islands, scouts, clouds. Crossover and edits prepare a child's genome
+before its run (varying.py); mutation happens inside it (choosing.py).
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportReturnType=false
@@ -23,6 +18,11 @@ from llvmlite import ir
 from numba import carray, njit, types
 from numba.extending import intrinsic
 
+from planners.query.choosing import (
+    draw_below,
+    draw_bits,
+    draw_unit,
+)
 from planners.query.header import (
     copy_reals,
     header_at,
@@ -32,392 +32,20 @@ from planners.query.header import (
     store_int,
     store_real,
 )
+from planners.query.varying import (
+    blend,
+    cloud,
+    edit_choices,
+    is_continuous,
+    mix,
+    shift,
+)
 
-KINDS = ("flip", "randint", "gaussian", "uniform", "categorical", "exponential", "lognormal")
-"""The distributions, in the order of the numbers below."""
-FLIP, RANDINT, GAUSSIAN, UNIFORM, CATEGORICAL, EXPONENTIAL, LOGNORMAL = range(7)
+CALLED = "44156c67d8de"
 
-FEW_STREAMS, FEW_CELLS, NARROW, SHORT = 1, 2, 4, 8
-"""Why a run overflowed: which of the tables must grow."""
-
-LOST = -2
-"""The stream or path for which there was no room."""
-
-RUNAWAY = 1_000_000
-"""Choices after which one run of a model is given up."""
-
-_U = np.uint64
-_GOLDEN, _FIRST, _SECOND = _U(0x9E3779B97F4A7C15), _U(0xBF58476D1CE4E5B9), _U(0x94D049BB133111EB)
-_S11, _S27, _S30, _S31, _S32 = _U(11), _U(27), _U(30), _U(31), _U(32)
-_ONE = _U(1)
-_UNIT = 2.0**-53
-_REDRAW = 0.1  # of the mutations draw anew, where a step could be taken
-_CANCEL = 0.25  # of the pair mutations move all of one value to another
+_U, _S32 = np.uint64, np.uint64(32)
 _AFTER_CHANGE = 0.005  # a cloud's step at least, in spreads, when the world has changed
 _CALMING = 0.1  # of the way back to the usual rate of mutation, each generation
-
-
-# --- Randomness: splitmix64 (Steele, Lea & Flood 2014).
-
-
-@njit(cache=True, forceinline=True)
-def _bits(h: Any) -> Any:
-    h.random = h.random + _GOLDEN
-    z = h.random
-    z = (z ^ (z >> _S30)) * _FIRST
-    z = (z ^ (z >> _S27)) * _SECOND
-    return z ^ (z >> _S31)
-
-
-@njit(cache=True, forceinline=True)
-def _unit(h: Any) -> float:
-    """Uniform in [0, 1)."""
-    return np.float64(np.int64(_bits(h) >> _S11)) * _UNIT
-
-
-@njit(cache=True, forceinline=True)
-def _below(h: Any, n: int) -> int:
-    """Uniform in [0, n), for n < 2^32."""
-    return np.int64(((_bits(h) >> _S32) * _U(n)) >> _S32)
-
-
-@njit(cache=True)
-def _normal(h: Any) -> float:
-    """Standard normal, by Marsaglia's polar method."""
-    while True:
-        x = 2.0 * _unit(h) - 1.0
-        y = 2.0 * _unit(h) - 1.0
-        square = x * x + y * y
-        if 0.0 < square < 1.0:
-            return x * math.sqrt(-2.0 * math.log(square) / square)
-
-
-@njit(cache=True)
-def _step(h: Any) -> float:
-    """A normal step whose size is log-uniform, in units of the spread of what it changes."""
-    size = h.largest_step
-    if h.smallest_step < size:
-        size *= math.exp(_unit(h) * h.steps_range)
-    return size * _normal(h)
-
-
-# --- Addresses.
-
-
-@njit(cache=True)
-def _place(h: Any, parent: int, name: int, index: int) -> int:
-    """Where a key stands in the hash table, or the empty place where it belongs."""
-    size = 4 * h.most_streams
-    slots = carray(pointer(h.slots), size, np.int32)
-    keys = carray(pointer(h.streams), (h.most_streams, 3), np.int64)
-    mixed = (_U(parent + 1) * _FIRST) ^ (_U(name + 1) * _SECOND) ^ (_U(index + 2) * _GOLDEN)
-    place = np.int64((mixed >> _S32) % _U(size))
-    while slots[place] >= 0:
-        found = slots[place]
-        if keys[found, 0] == parent and keys[found, 1] == name and keys[found, 2] == index:
-            break
-        place = place + 1 if place + 1 < size else 0
-    return place
-
-
-@njit(cache=True)
-def stream_of(header: int, parent: int, name: int, index: int) -> int:
-    """The number of a source's stream (index -1) or of the path `name`/`index`, below a path.
-
-    A new one is made if need be; LOST if the table is full. `parent` is -1 at the root.
-    """
-    h = header_at(header)
-    if parent == LOST:
-        return LOST
-    place = _place(h, parent, name, index)
-    known = np.int64(load_int(h.slots, place))
-    if known >= 0:
-        return known
-    made = h.known_streams
-    if made >= h.most_streams:
-        return LOST
-    keys = carray(pointer(h.streams), (h.most_streams, 3), np.int64)
-    keys[made, 0], keys[made, 1], keys[made, 2] = parent, name, index
-    store_int(h.slots, place, made)
-    store_int(h.counts, made, 0)
-    h.known_streams = made + 1
-    return made
-
-
-@njit(cache=True)
-def hash_again(header: int) -> None:
-    """Fill an empty hash table from the streams."""
-    h = header_at(header)
-    keys = carray(pointer(h.streams), (h.most_streams, 3), np.int64)
-    for stream in range(h.known_streams):
-        place = _place(h, keys[stream, 0], keys[stream, 1], keys[stream, 2])
-        store_int(h.slots, place, stream)
-
-
-@njit(cache=True)
-def cell_of(header: int, stream: int, index: int, kind: int) -> int:
-    """The cell of an address, a new one if need be; -1 if the tables are full."""
-    h = header_at(header)
-    if index >= h.width or stream < 0:
-        return -1
-    known = np.int64(load_int(h.cells, stream * h.width + index))
-    if known >= 0:
-        return known
-    made = h.known_cells
-    if made + 1 >= h.most_cells:  # the last cell is scrap, for choices that have none
-        return -1
-    store_int(h.cells, stream * h.width + index, made)
-    store_int(h.homes, 3 * made, stream)
-    store_int(h.homes, 3 * made + 1, index)
-    store_int(h.homes, 3 * made + 2, kind)
-    store_real(h.fixed, made, np.nan)
-    genomes = carray(pointer(h.genomes), (2 * (h.size + 1), h.most_cells), np.float64)
-    for row in range(2 * (h.size + 1)):
-        genomes[row, made] = np.nan
-    h.known_cells = made + 1
-    return made
-
-
-@njit(cache=True, forceinline=False)
-def _overflow(h: Any, reason: int) -> int:
-    h.overflow = h.overflow | reason
-    if h.length > RUNAWAY:
-        raise RuntimeError("the model made more than 1,000,000 choices in one run; bound its loop")
-    scrap = h.most_cells - 1
-    store_real(h.genome, scrap, np.nan)
-    return scrap
-
-
-@njit(cache=True, forceinline=True)
-def _asked(header: int, h: Any, stream: int, kind: int) -> int:
-    """The cell of the next call to a stream, written down in the log."""
-    at = h.length
-    h.length = at + 1
-    if stream < 0:
-        return _overflow(h, FEW_STREAMS)
-    index = np.int64(load_int(h.counts, stream))
-    store_int(h.counts, stream, index + 1)
-    if index < h.width and at < h.longest:
-        cell = np.int64(load_int(h.cells, stream * h.width + index))
-        if cell >= 0:
-            store_int(h.log, at, cell)
-            return cell
-    return _asked_anew(header, at, stream, index, kind)
-
-
-@njit(cache=True, forceinline=False)
-def _asked_anew(header: int, at: int, stream: int, index: int, kind: int) -> int:
-    """The same for an address without a cell, and where there is no room."""
-    h = header_at(header)
-    cell = cell_of(header, stream, index, kind)
-    if cell < 0:
-        return _overflow(h, FEW_CELLS if index < h.width else NARROW)
-    if at >= h.longest:
-        return _overflow(h, SHORT)
-    store_int(h.log, at, cell)
-    return cell
-
-
-@njit(cache=True, forceinline=True)
-def _due(h: Any, cell: int) -> bool:
-    """Whether this inherited value is to be mutated."""
-    h.countdown = h.countdown - 1
-    return h.countdown == 0 and _due_now(h, cell)
-
-
-@njit(cache=True, forceinline=False)
-def _due_now(h: Any, cell: int) -> bool:
-    h.countdown = 1 + _below(h, 2 * h.gap)
-    if h.constrained:
-        known = load_real(h.fixed, cell)
-        return known != known
-    return True
-
-
-# --- The calls of a model.
-
-
-@njit(cache=True, forceinline=True)
-def flip(header: int, stream: int, p: float) -> bool:
-    h = header_at(header)
-    cell = _asked(header, h, stream, FLIP)
-    value = load_real(h.genome, cell)
-    if value == value and not _due(h, cell):
-        return value != 0.0
-    return _flip_anew(header, cell, value, p)
-
-
-@njit(cache=True, forceinline=False)
-def _flip_anew(header: int, cell: int, value: float, p: float) -> bool:
-    h = header_at(header)
-    if value != value:
-        value = 1.0 if _unit(h) < p else 0.0
-    else:
-        value = 1.0 - value
-    store_real(h.genome, cell, value)
-    return value != 0.0
-
-
-@njit(cache=True, forceinline=True)
-def randint(header: int, stream: int, n: int) -> int:
-    h = header_at(header)
-    if n < 1:
-        raise ValueError("randint(source, n) was asked with n < 1; n is the number of values")
-    cell = _asked(header, h, stream, RANDINT)
-    value = load_real(h.genome, cell)
-    if 0.0 <= value < n and not _due(h, cell):
-        return np.int64(value)
-    return _randint_anew(header, cell, value, n)
-
-
-@njit(cache=True, forceinline=False)
-def _randint_anew(header: int, cell: int, value: float, n: int) -> int:
-    h = header_at(header)
-    if 0.0 <= value < n and not _unit(h) < 0.5:
-        near = value + math.floor(_step(h) * n + 0.5)
-        value = near if 0.0 <= near < n else np.float64(_below(h, n))
-    else:
-        value = np.float64(_below(h, n))
-    store_real(h.genome, cell, value)
-    return np.int64(value)
-
-
-@njit(cache=True, forceinline=True)
-def gaussian(header: int, stream: int, mean: float, sigma: float) -> float:
-    h = header_at(header)
-    cell = _asked(header, h, stream, GAUSSIAN)
-    value = load_real(h.genome, cell)
-    if value == value and not _due(h, cell):
-        return value
-    return _gaussian_anew(header, stream, cell, value, mean, sigma)
-
-
-@njit(cache=True, forceinline=False)
-def _gaussian_anew(
-    header: int, stream: int, cell: int, value: float, mean: float, sigma: float
-) -> float:
-    h = header_at(header)
-    if value != value or _unit(h) < _REDRAW:
-        value = mean + sigma * _normal(h)
-    else:
-        value += sigma * _step(h)
-    store_real(h.scales, max(0, stream), sigma)
-    store_real(h.genome, cell, value)
-    return value
-
-
-@njit(cache=True)
-def uniform(header: int, stream: int, low: float, high: float) -> float:
-    h = header_at(header)
-    if not low <= high:
-        raise ValueError("uniform(source, low, high) was asked with low > high")
-    cell = _asked(header, h, stream, UNIFORM)
-    value = load_real(h.genome, cell)
-    if not low <= value <= high:
-        value = low + (high - low) * _unit(h)
-    elif _due(h, cell):
-        moved = value + (high - low) * _step(h)
-        value = moved if low <= moved <= high else low + (high - low) * _unit(h)
-    else:
-        return value
-    store_real(h.scales, max(0, stream), high - low)
-    store_real(h.genome, cell, value)
-    return value
-
-
-@njit(cache=True)
-def categorical(header: int, stream: int, weights: np.ndarray) -> int:
-    h = header_at(header)
-    total = 0.0
-    for weight in weights:
-        if not weight >= 0.0:
-            raise ValueError("categorical(source, weights) was asked with a weight < 0")
-        total += weight
-    if not total > 0.0:
-        raise ValueError("categorical(source, weights) was asked with weights that are all 0")
-    cell = _asked(header, h, stream, CATEGORICAL)
-    value = load_real(h.genome, cell)
-    kept = 0.0 <= value < len(weights) and weights[np.int64(value)] > 0.0
-    if kept and not _due(h, cell):
-        return np.int64(value)
-    left = _unit(h) * total
-    chosen = np.int64(0)
-    for i in range(len(weights)):
-        if weights[i] > 0.0:
-            chosen = i
-            left -= weights[i]
-            if left < 0.0:
-                break
-    store_real(h.genome, cell, np.float64(chosen))
-    return chosen
-
-
-@njit(cache=True)
-def exponential(header: int, stream: int, scale: float) -> float:
-    h = header_at(header)
-    if not scale >= 0.0:
-        raise ValueError("exponential(source, scale) was asked with a scale < 0")
-    cell = _asked(header, h, stream, EXPONENTIAL)
-    value = load_real(h.genome, cell)
-    if not value >= 0.0:
-        value = -scale * math.log(1.0 - _unit(h))
-    elif _due(h, cell):
-        if _unit(h) < _REDRAW:
-            value = -scale * math.log(1.0 - _unit(h))
-        else:
-            value = abs(value + scale * _step(h))
-    else:
-        return value
-    store_real(h.scales, max(0, stream), scale)
-    store_real(h.genome, cell, value)
-    return value
-
-
-@njit(cache=True)
-def lognormal(header: int, stream: int, mean: float, sigma: float) -> float:
-    h = header_at(header)
-    cell = _asked(header, h, stream, LOGNORMAL)
-    value = load_real(h.genome, cell)
-    if not value > 0.0:
-        value = math.exp(mean + sigma * _normal(h))
-    elif _due(h, cell):
-        if _unit(h) < _REDRAW:
-            value = math.exp(mean + sigma * _normal(h))
-        else:
-            value *= math.exp(sigma * _step(h))
-    else:
-        return value
-    store_real(h.scales, max(0, stream), sigma)
-    store_real(h.genome, cell, value)
-    return value
-
-
-# --- Making a generation. Genomes and logs go by their addresses: nothing is faster to pass on.
-
-
-@njit(cache=True, forceinline=True)
-def _stream(h: Any, cell: int) -> int:
-    return np.int64(load_int(h.homes, 3 * cell))
-
-
-@njit(cache=True, forceinline=True)
-def _index(h: Any, cell: int) -> int:
-    return np.int64(load_int(h.homes, 3 * cell + 1))
-
-
-@njit(cache=True, forceinline=True)
-def _kind(h: Any, cell: int) -> int:
-    return np.int64(load_int(h.homes, 3 * cell + 2))
-
-
-@njit(cache=True, forceinline=True)
-def _continuous(kind: int) -> bool:
-    return kind in (GAUSSIAN, UNIFORM, EXPONENTIAL, LOGNORMAL)
-
-
-@njit(cache=True, forceinline=True)
-def _at(log: int, place: int) -> int:
-    return np.int64(load_int(log, place))
 
 
 @njit(cache=True, forceinline=True)
@@ -430,202 +58,10 @@ def _parent(h: Any, row: int) -> int:
 def _better(h: Any, first: int, size: int) -> int:
     """A parent: the better of two."""
     values = h.values + 8 * h.side * (h.size + 1)
-    bits = _bits(h)
+    bits = draw_bits(h)
     one = first + np.int64(((bits >> _S32) * _U(size)) >> _S32)
     two = first + np.int64(((bits & _U(0xFFFFFFFF)) * _U(size)) >> _S32)
     return one if load_real(values, one) <= load_real(values, two) else two
-
-
-@njit(cache=True)
-def _mix(h: Any, child: int, a: int, b: int, known: int) -> None:
-    """Each value from one parent or the other; what only one of them has is inherited.
-
-    Without branches, 64 values by one word of random bits: the compiler makes vectors of it.
-    """
-    for begin in range(0, known, 64):
-        bits = _bits(h)
-        for i in range(min(64, known - begin)):
-            x, y = load_real(a, begin + i), load_real(b, begin + i)
-            from_a = (bits >> _U(i)) & _ONE != 0
-            one, two = x if from_a else y, y if from_a else x
-            store_real(child, begin + i, one if one == one else two)
-
-
-@njit(cache=True)
-def _blend(h: Any, child: int, a: int, b: int, c: int, share: float, log: int, length: int) -> None:
-    """a + share (b - c), in the continuous choices that a made and all three have."""
-    copy_reals(child, a, h.known_cells)
-    for at in range(length):
-        cell = _at(log, at)
-        if _continuous(_kind(h, cell)):
-            value = load_real(a, cell) + share * (load_real(b, cell) - load_real(c, cell))
-            if value == value:
-                store_real(child, cell, value)
-
-
-@njit(cache=True)
-def _shift(h: Any, child: int, log: int, length: int) -> bool:
-    """Move a bit of one value of a source to another of its values: their sum stays.
-
-    What adds up to a goal can only be straightened that way.
-    """
-    at = _below(h, length)
-    for _ in range(length):
-        kind = _kind(h, _at(log, at))
-        if kind in (GAUSSIAN, UNIFORM):
-            break
-        at = at + 1 if at + 1 < length else 0
-    else:
-        return False
-    one = _at(log, at)
-    stream = _stream(h, one)
-    other = _below(h, length)
-    for _ in range(length):
-        if _stream(h, _at(log, other)) == stream and _at(log, other) != one:
-            break
-        other = other + 1 if other + 1 < length else 0
-    else:
-        return False
-    two = _at(log, other)
-    if _unit(h) < _CANCEL:
-        moved = -load_real(child, one)
-    else:
-        moved = load_real(h.scales, stream) * _step(h)
-    store_real(child, one, load_real(child, one) + moved)
-    store_real(child, two, load_real(child, two) - moved)
-    return True
-
-
-@njit(cache=True)
-def _edit(header: int, child: int, log: int, length: int, known: int) -> None:
-    """Delete, repeat, insert, split or merge one turn of the model's loop.
-
-    A turn is what was chosen between two successive calls to one stream, found in the order of the
-    calls. What is split or merged keeps the sum of its normal variables.
-    """
-    h = header_at(header)
-    stream = _stream(h, _at(log, 0 if _unit(h) < 0.5 else _below(h, length)))
-    begin = _below(h, length)
-    for _ in range(length):
-        if _stream(h, _at(log, begin)) == stream:
-            break
-        begin = begin + 1 if begin + 1 < length else 0
-    end = _turn_end(h, log, length, begin)
-    if end == length:
-        return
-    edit = _below(h, 5)
-    if edit == 0:
-        _delete(h, child, log, length, begin, end)
-    elif edit == 4:
-        over = _turn_end(h, log, length, end)
-        turn = end - begin
-        if over == length or over - end != turn:
-            return
-        for at in range(begin, end):
-            if _stream(h, _at(log, at)) != _stream(h, _at(log, at + turn)):
-                return
-        for at in range(begin, end):
-            cell = _at(log, at)
-            if _kind(h, cell) == GAUSSIAN:
-                value = load_real(child, cell) + load_real(child, _at(log, at + turn))
-                store_real(child, cell, value)
-        _delete(h, child, log, length, end, over)
-    else:
-        share = _unit(h)
-        _repeat(header, child, log, length, begin, end, edit, share, known)
-
-
-@njit(cache=True)
-def _turn_end(h: Any, log: int, length: int, begin: int) -> int:
-    """Where the next turn begins, or `length`."""
-    stream = _stream(h, _at(log, begin))
-    end = begin + 1
-    while end < length and _stream(h, _at(log, end)) != stream:
-        end += 1
-    return end
-
-
-@njit(cache=True, forceinline=True)
-def _count(h: Any, log: int, begin: int, end: int) -> None:
-    """Count the calls of a turn, by stream."""
-    for at in range(begin, end):
-        stream = _stream(h, _at(log, at))
-        store_int(h.counts, stream, load_int(h.counts, stream) + 1)
-
-
-@njit(cache=True, forceinline=True)
-def _uncount(h: Any, log: int, begin: int, end: int) -> None:
-    for at in range(begin, end):
-        store_int(h.counts, _stream(h, _at(log, at)), 0)
-
-
-@njit(cache=True)
-def _delete(h: Any, child: int, log: int, length: int, begin: int, end: int) -> None:
-    """Move what comes after a turn to where the turn was, source by source."""
-    _count(h, log, begin, end)
-    for at in range(end, length):
-        source = _at(log, at)
-        stream = _stream(h, source)
-        moved = np.int64(load_int(h.counts, stream))
-        if moved:
-            target = load_int(h.cells, stream * h.width + _index(h, source) - moved)
-            store_real(child, np.int64(target), load_real(child, source))
-    _uncount(h, log, begin, end)
-
-
-@njit(cache=True)
-def _repeat(
-    header: int,
-    child: int,
-    log: int,
-    length: int,
-    begin: int,
-    end: int,
-    edit: int,
-    share: float,
-    known: int,
-) -> None:
-    """Make room after a turn: for a copy (edit 1), a new one (2) or a share of it (3)."""
-    h = header_at(header)
-    _count(h, log, begin, end)
-    for at in range(length - 1, begin - 1, -1):
-        source = _at(log, at)
-        stream = _stream(h, source)
-        moved = np.int64(load_int(h.counts, stream))
-        if moved:
-            kind, index = _kind(h, source), _index(h, source) + moved
-            target = np.int64(-1)
-            if index < h.width:
-                target = np.int64(load_int(h.cells, stream * h.width + index))
-                if target < 0:
-                    target = cell_of(header, stream, index, kind)
-            if 0 <= target < known:
-                value = load_real(child, source)
-                moved_value = value
-                if at < end and edit == 2 and at > begin:
-                    moved_value = np.nan
-                elif at < end and edit == 3 and kind == GAUSSIAN:
-                    moved_value = (1.0 - share) * value
-                    store_real(child, source, value * share)
-                store_real(child, target, moved_value)
-    _uncount(h, log, begin, end)
-
-
-@njit(cache=True)
-def _cloud(h: Any, child: int, a: int, log: int, length: int, step: float) -> int:
-    """Move all continuous choices of an individual a little; how many there are."""
-    copy_reals(child, a, h.known_cells)
-    moved = 0
-    for at in range(length):
-        cell = _at(log, at)
-        kind = _kind(h, cell)
-        if _continuous(kind):
-            spread = load_real(h.scales, _stream(h, cell)) * step * _normal(h)
-            value = load_real(child, cell)
-            value = value * math.exp(spread) if kind == LOGNORMAL else value + spread
-            store_real(child, cell, value)
-            moved += 1
-    return moved
 
 
 @njit(cache=True)
@@ -667,13 +103,13 @@ def breed(header: int, row: int) -> None:
     island = _island(h, row)
     first, size, kept = _extent(h, island)
     begins = h.generation == 0 or load_int(h.begins, island) != 0
-    if begins or (row - first >= kept and _unit(h) < h.immigrants):
+    if begins or (row - first >= kept and draw_unit(h) < h.immigrants):
         for cell in range(known):
             store_real(child, cell, np.nan)
     elif row - first < kept:
         copy_reals(child, _parent(h, np.int64(load_int(h.elites, row))), known)
     else:
-        chosen = _unit(h)
+        chosen = draw_unit(h)
         clouded = chosen < h.cloud
         a = np.int64(load_int(h.elites, first)) if clouded else _better(h, first, size)
         at = h.side * (h.size + 1) + a
@@ -682,26 +118,26 @@ def breed(header: int, row: int) -> None:
         parent = _parent(h, a)
         chosen -= h.cloud
         if clouded:
-            h.clouded = _cloud(h, child, parent, log, length, load_real(h.steps, island))
+            h.clouded = cloud(h, child, parent, log, length, load_real(h.steps, island))
         elif chosen < h.crossover:
-            _mix(h, child, parent, _parent(h, _better(h, first, size)), known)
+            mix(h, child, parent, _parent(h, _better(h, first, size)), known)
         elif chosen < h.crossover + h.line:
             other = _parent(h, _better(h, first, size))
-            _blend(h, child, parent, other, parent, 1.5 * _unit(h) - 0.25, log, length)
+            blend(h, child, parent, other, parent, 1.5 * draw_unit(h) - 0.25, log, length)
         elif chosen < h.crossover + h.line + h.difference:
-            b = _parent(h, first + _below(h, size))
-            c = _parent(h, first + _below(h, size))
-            _blend(h, child, parent, b, c, _unit(h), log, length)
+            b = _parent(h, first + draw_below(h, size))
+            c = _parent(h, first + draw_below(h, size))
+            blend(h, child, parent, b, c, draw_unit(h), log, length)
         else:
             copy_reals(child, parent, known)
         if length > 0 and not clouded:
-            shifted = _unit(h) < h.pair and _shift(h, child, log, length)
-            if _unit(h) < h.structure:
-                _edit(header, child, log, length, known)
+            shifted = draw_unit(h) < h.pair and shift(h, child, log, length)
+            if draw_unit(h) < h.structure:
+                edit_choices(header, child, log, length, known)
             if not shifted:
                 hurry = 1.0 if h.adaptive == 0 else 1.0 + 2.0 * (1.0 - h.calm)
                 h.gap = max(1, np.int64(length / (h.mutations * hurry)))
-                h.countdown = 1 + _below(h, 2 * h.gap)
+                h.countdown = 1 + draw_below(h, 2 * h.gap)
     if h.constrained:
         for cell in range(known):
             fixed = load_real(h.fixed, cell)
@@ -866,7 +302,7 @@ def _near(h: Any, one: int, two: int) -> bool:
         if logs[two, at] != cell:
             return False
         apart = genomes[one, cell] - genomes[two, cell]
-        if _continuous(homes[cell, 2]):
+        if is_continuous(homes[cell, 2]):
             apart /= load_real(h.scales, np.int64(homes[cell, 0]))
             square += apart * apart
         elif apart != 0.0:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from planners.query import genetics
+from planners.query import choosing
 from planners.query.header import HEADER
 
 _TABLES = {  # field of the header: type, shape by name of size, filler
@@ -55,7 +55,7 @@ class Memory:
             if name != "slots":
                 self.blocks[name][tuple(slice(0, n) for n in block.shape)] = block
         if field == "most_streams":
-            genetics.hash_again(self.address)
+            choosing.hash_again(self.address)
         else:
             self.blocks["slots"][:] = before["slots"]
 

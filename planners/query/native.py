@@ -24,7 +24,7 @@ from numba import from_dtype, njit, types
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic, models, overload, overload_method, register_model
 
-from planners.query import arithmetic, genetics, header
+from planners.query import arithmetic, choosing, header
 from planners.query.errors import NativeError
 from planners.query.reading import Function, Text
 
@@ -104,7 +104,7 @@ def _stream(rng: Any, number: int) -> Any:
 def _stream_here(rng, number):
     if isinstance(rng, RngType):
         return lambda rng, number: number
-    return lambda rng, number: genetics.stream_of(_address(rng), _path(rng), number, -1)
+    return lambda rng, number: choosing.stream_of(_address(rng), _path(rng), number, -1)
 
 
 _INLINED = {"forceinline": True}
@@ -125,7 +125,7 @@ def _at(rng, name, place=0):
     def at(rng, name, place=0):
         if place < 0:
             raise ValueError("rng.at(name, place) was asked with a place < 0")
-        return _below(rng, genetics.stream_of(_address(rng), _path(rng), number, np.int64(place)))
+        return _below(rng, choosing.stream_of(_address(rng), _path(rng), number, np.int64(place)))
 
     return at
 
@@ -134,7 +134,7 @@ def _at(rng, name, place=0):
 @overload_method(PathType, "flip", prefer_literal=True, jit_options=_INLINED)
 def _flip(rng, source, p=0.5):
     number = _number(rng, source)
-    return lambda rng, source, p=0.5: genetics.flip(
+    return lambda rng, source, p=0.5: choosing.flip(
         _address(rng), _stream(rng, number), np.float64(p)
     )
 
@@ -145,14 +145,14 @@ def _randint(rng, source, n):
     number = _number(rng, source)
     if not isinstance(n, types.Integer | types.IntegerLiteral):
         raise TypingError(f"randint(source, n) takes an integer n, not {n}")
-    return lambda rng, source, n: genetics.randint(_address(rng), _stream(rng, number), np.int64(n))
+    return lambda rng, source, n: choosing.randint(_address(rng), _stream(rng, number), np.int64(n))
 
 
 @overload_method(RngType, "gaussian", prefer_literal=True, jit_options=_INLINED)
 @overload_method(PathType, "gaussian", prefer_literal=True, jit_options=_INLINED)
 def _gaussian(rng, source, mean=0.0, sigma=1.0):
     number = _number(rng, source)
-    return lambda rng, source, mean=0.0, sigma=1.0: genetics.gaussian(
+    return lambda rng, source, mean=0.0, sigma=1.0: choosing.gaussian(
         _address(rng), _stream(rng, number), np.float64(mean), np.float64(sigma)
     )
 
@@ -161,7 +161,7 @@ def _gaussian(rng, source, mean=0.0, sigma=1.0):
 @overload_method(PathType, "uniform", prefer_literal=True)
 def _uniform(rng, source, low=0.0, high=1.0):
     number = _number(rng, source)
-    return lambda rng, source, low=0.0, high=1.0: genetics.uniform(
+    return lambda rng, source, low=0.0, high=1.0: choosing.uniform(
         _address(rng), _stream(rng, number), np.float64(low), np.float64(high)
     )
 
@@ -175,7 +175,7 @@ def _categorical(rng, source, weights):
         shares = np.empty(len(weights))
         for i in range(len(weights)):
             shares[i] = weights[i]
-        return genetics.categorical(_address(rng), _stream(rng, number), shares)
+        return choosing.categorical(_address(rng), _stream(rng, number), shares)
 
     return categorical
 
@@ -184,7 +184,7 @@ def _categorical(rng, source, weights):
 @overload_method(PathType, "exponential", prefer_literal=True)
 def _exponential(rng, source, scale=1.0):
     number = _number(rng, source)
-    return lambda rng, source, scale=1.0: genetics.exponential(
+    return lambda rng, source, scale=1.0: choosing.exponential(
         _address(rng), _stream(rng, number), np.float64(scale)
     )
 
@@ -193,7 +193,7 @@ def _exponential(rng, source, scale=1.0):
 @overload_method(PathType, "lognormal", prefer_literal=True)
 def _lognormal(rng, source, mean=0.0, sigma=1.0):
     number = _number(rng, source)
-    return lambda rng, source, mean=0.0, sigma=1.0: genetics.lognormal(
+    return lambda rng, source, mean=0.0, sigma=1.0: choosing.lognormal(
         _address(rng), _stream(rng, number), np.float64(mean), np.float64(sigma)
     )
 
@@ -291,7 +291,7 @@ def _bytes(constant: Any) -> bytes:
 def _engine() -> str:
     """A digest of the kernels that are compiled into every model."""
     digest = hashlib.blake2b(digest_size=8)
-    for module in (arithmetic, genetics, header):
+    for module in (arithmetic, choosing, header):
         digest.update(Path(str(module.__file__)).read_bytes())
     digest.update(Path(__file__).read_bytes())
     return digest.hexdigest()

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from planners.query import genetics
+from planners.query import choosing, genetics
+from planners.query.choosing import KINDS
 from planners.query.errors import ModelError
-from planners.query.genetics import KINDS
 from planners.query.memory import Memory
 from planners.query.reading import Text, two_kinds
 
@@ -42,7 +42,7 @@ class Sources:
             raise ModelError(f"the name of a source is {name!r}; give a string")
         if self.kinds.setdefault(name, kind) != kind:
             raise two_kinds(name, self.kinds[name], kind)
-        found = genetics.stream_of(self.memory.address, path, self.number(name), -1)
+        found = choosing.stream_of(self.memory.address, path, self.number(name), -1)
         if path == -1 and found >= 0:
             self.at_root[name] = found
         return found
@@ -52,7 +52,7 @@ class Sources:
         *path, name = address[0].split("/") if address[0] not in self.kinds else [address[0]]
         while True:
             stream = self._descend(path, name, kind)
-            cell = genetics.cell_of(self.memory.address, stream, address[1], KINDS.index(kind))
+            cell = choosing.cell_of(self.memory.address, stream, address[1], KINDS.index(kind))
             if cell >= 0:
                 return cell
             for field in ("most_streams",) if stream < 0 else ("width", "most_cells"):
@@ -61,7 +61,7 @@ class Sources:
     def _descend(self, path: Sequence[str], name: str, kind: str) -> int:
         at = -1
         for scope, place in zip(path[::2], path[1::2], strict=True):
-            at = genetics.stream_of(self.memory.address, at, self.number(scope), int(place))
+            at = choosing.stream_of(self.memory.address, at, self.number(scope), int(place))
         return self.stream(at, name, kind)
 
     def address_of(self, cell: int) -> tuple[tuple[str, int], str]:
@@ -109,41 +109,41 @@ class Rng:
         if place < 0:
             raise ValueError("rng.at(name, place) was asked with a place < 0")
         number = self._sources.number(name)
-        path = genetics.stream_of(self._address, self._path, number, index(place))
+        path = choosing.stream_of(self._address, self._path, number, index(place))
         return Rng.of(self._sources, path)
 
     def flip(self, source: str, p: float = 0.5) -> bool:
         """True with probability p."""
-        return genetics.flip(self._address, self._stream(source, "flip"), float(p))
+        return choosing.flip(self._address, self._stream(source, "flip"), float(p))
 
     def randint(self, source: str, n: int) -> int:
         """An integer in [0, n), each as probable."""
-        return genetics.randint(self._address, self._stream(source, "randint"), index(n))
+        return choosing.randint(self._address, self._stream(source, "randint"), index(n))
 
     def gaussian(self, source: str, mean: float = 0.0, sigma: float = 1.0) -> float:
         """Normally distributed."""
         stream = self._stream(source, "gaussian")
-        return genetics.gaussian(self._address, stream, float(mean), float(sigma))
+        return choosing.gaussian(self._address, stream, float(mean), float(sigma))
 
     def uniform(self, source: str, low: float = 0.0, high: float = 1.0) -> float:
         """Uniform between low and high."""
         stream = self._stream(source, "uniform")
-        return genetics.uniform(self._address, stream, float(low), float(high))
+        return choosing.uniform(self._address, stream, float(low), float(high))
 
     def categorical(self, source: str, weights: Sequence[float]) -> int:
         """The place of one of the weights, in proportion to it."""
         stream = self._stream(source, "categorical")
-        return genetics.categorical(self._address, stream, np.array(weights, np.float64))
+        return choosing.categorical(self._address, stream, np.array(weights, np.float64))
 
     def exponential(self, source: str, scale: float = 1.0) -> float:
         """Exponentially distributed with this mean."""
         stream = self._stream(source, "exponential")
-        return genetics.exponential(self._address, stream, float(scale))
+        return choosing.exponential(self._address, stream, float(scale))
 
     def lognormal(self, source: str, mean: float = 0.0, sigma: float = 1.0) -> float:
         """exp of a normal variable with this mean and deviation."""
         stream = self._stream(source, "lognormal")
-        return genetics.lognormal(self._address, stream, float(mean), float(sigma))
+        return choosing.lognormal(self._address, stream, float(mean), float(sigma))
 
     def _stream(self, source: str, kind: str) -> int:
         if self._path == -1 and self._sources.kinds.get(source) == kind:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from anytime.clocks import Clock, Deadline, WorkClock
 from anytime.errors import AnytimeError
-from planners.query import genetics
+from planners.query import choosing, genetics
 from planners.query.background import Share, Turns, Worker
 from planners.query.choices import Address, Choices, Solution
 from planners.query.errors import NativeError
@@ -236,13 +236,13 @@ class Query:
         memory, reasons = self._memory, self._memory["grow"]
         if not reasons:
             return
-        if reasons & genetics.FEW_STREAMS:
+        if reasons & choosing.FEW_STREAMS:
             memory.grow("most_streams")
-        if reasons & genetics.FEW_CELLS:
+        if reasons & choosing.FEW_CELLS:
             memory.grow("most_cells")
-        if reasons & genetics.NARROW and memory["width"] < _LONGEST:
+        if reasons & choosing.NARROW and memory["width"] < _LONGEST:
             memory.grow("width")
-        if reasons & genetics.SHORT and memory["longest"] < _LONGEST:
+        if reasons & choosing.SHORT and memory["longest"] < _LONGEST:
             memory.grow("longest")
         memory["grow"] = 0
 

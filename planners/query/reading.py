@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from planners.query import arithmetic
+from planners.query.choosing import KINDS
 from planners.query.errors import ModelError, NativeError
-from planners.query.genetics import KINDS
 
 PATH = "at"
 """The method of `rng` that goes down a path."""
