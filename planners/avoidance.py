@@ -10,8 +10,8 @@ from anytime.errors import AnytimeError
 from planners.frontier import cells_of
 from planners.path_finding import Cell, flat, index_of
 from planners.search import STRAIGHT, UNLIMITED, workspace
-from planners.windows import REACHED, UNREACHABLE
-from planners.windows import walk as _walk
+from planners.walking import REACHED, UNREACHABLE
+from planners.walking import walk as _walk
 
 # The longest level of a plan's cell: a block of 2^15 cells is wider than any map.
 _HIGHEST_LEVEL = 15

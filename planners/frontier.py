@@ -5,14 +5,16 @@ A grid is flat bytes of costs: `wall` is impassable, every other value at least 
 orthogonal cells, so corners are never cut. Labels and bases are those of `planners.search`.
 
 Kernels of other files call these, and numba's cache does not see a callee in another file change.
-So such a file states this one's digest as `FRONTIER` (a test compares): who changes this file
-touches those, and all of their machine code is made anew.
+So a file with kernels states the digest of the files it calls as `CALLED` (a test compares): who
+changes this file touches those, and all of their machine code is made anew.
 """
 
 import numpy as np
 from numba import njit
 
 from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
+
+CALLED = "faffbc721331"
 
 ONE, SIDE_BITS = np.uint64(1), np.uint64(8)
 NOT_FIRST = ~np.uint64(0x0101010101010101)

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from planners.blocks import SIDE, Regions, features, forget, new_regions
 from planners.path_finding import Cell, flat, index_of
+from planners.refining import FULL
 from planners.search import WALL
-from planners.windows import FULL
+
+CALLED = "20bd87ac3dd7"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much

@@ -18,8 +18,7 @@ from anytime.errors import AnytimeError
 from planners.grids import BELIEVED
 from planners.multipath import MultiPath, Step
 from planners.path_finding import Cell, index_of
-from planners.search import DIAGONAL, STRAIGHT, workspace
-from planners.windows import (
+from planners.refining import (
     ABSTRACT,
     COUNT,
     FIRST,
@@ -32,6 +31,9 @@ from planners.windows import (
     first_plan,
     refine,
 )
+from planners.search import DIAGONAL, STRAIGHT, workspace
+
+CALLED = "ba4442de4e6c"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

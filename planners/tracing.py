@@ -20,7 +20,7 @@ from planners.blocks import (
 from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-FRONTIER = "e939f8aacbfe"
+CALLED = "7338a5f77192"
 
 TAUT = 2
 """How often pins are drawn taut."""

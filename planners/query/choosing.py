@@ -4,9 +4,7 @@
 lacks are drawn, so lengths and parameters may vary from run to run. Mutation happens here, where
 the parameters of the choice are known.
 
-All kernels take the address of a query's header alone (header.py). Kernels of other files call
-these, and numba's cache does not see a callee in another file change: so such a file states the
-digest of those it calls as `CALLED` (a test compares).
+All kernels take the address of a query's header alone (header.py).
 """
 
 # pyright: reportArgumentType=false, reportCallIssue=false, reportReturnType=false
@@ -21,14 +19,7 @@ from typing import Any
 import numpy as np
 from numba import carray, njit
 
-from planners.query.header import (
-    header_at,
-    load_int,
-    load_real,
-    pointer,
-    store_int,
-    store_real,
-)
+from planners.query.header import header_at, load_int, load_real, pointer, store_int, store_real
 
 CALLED = "5f139c62ad7a"
 

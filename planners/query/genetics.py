@@ -18,11 +18,7 @@ from llvmlite import ir
 from numba import carray, njit, types
 from numba.extending import intrinsic
 
-from planners.query.choosing import (
-    draw_below,
-    draw_bits,
-    draw_unit,
-)
+from planners.query.choosing import draw_below, draw_bits, draw_unit
 from planners.query.header import (
     copy_reals,
     header_at,
@@ -32,16 +28,9 @@ from planners.query.header import (
     store_int,
     store_real,
 )
-from planners.query.varying import (
-    blend,
-    cloud,
-    edit_choices,
-    is_continuous,
-    mix,
-    shift,
-)
+from planners.query.varying import blend, cloud, edit_choices, is_continuous, mix, shift
 
-CALLED = "44156c67d8de"
+CALLED = "9dc7cb19d54a"
 
 _U, _S32 = np.uint64, np.uint64(32)
 _AFTER_CHANGE = 0.005  # a cloud's step at least, in spreads, when the world has changed
