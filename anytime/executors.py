@@ -26,7 +26,7 @@ def maker(specification: str) -> Make | None:
     if specification == "serial":
         return None
     if kind == "processes" and rest.isascii() and rest.isdigit() and 1 <= int(rest) <= 1024:
-        return lambda: _processes(int(rest))
+        return lambda: processes(int(rest))
     if kind == "dask" and rest.startswith("//") and len(rest) > 2:
         return lambda: _dask(f"tcp:{rest}")
     raise AnytimeError(f"executor {specification!r}; give {SPECIFICATIONS}")
@@ -60,8 +60,11 @@ class _Guest(Executor):
         self._close()
 
 
-def _processes(count: int) -> Executor:
-    """Processes that are started anew: a fork of a process with threads may deadlock."""
+def processes(count: int) -> Executor:
+    """So many processes, which end when this one does.
+
+    They are started anew: a fork of a process with threads may deadlock.
+    """
     methods = multiprocessing.get_all_start_methods()
     how = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     return ProcessPoolExecutor(count, mp_context=how, initializer=_end_with_parent)

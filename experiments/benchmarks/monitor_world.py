@@ -4,14 +4,13 @@ as measured."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from anytime.executors import processes
 from experiments import shipped
 from experiments.comparing import bootstrap, share_of_first
 from experiments.hindsight import hindsight
@@ -147,7 +146,7 @@ def world_figures(
     errors: list[float] = []
     settings: dict[str, object] = {"missions_a_cell": size.missions, "pairs": size.pairs}
     keys = [(value.kind, many) for many in (False, True) for value in VALUES]
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+    with processes(2) as pool:
         jobs = [pool.submit(live_cell, kind, many, size, seed) for kind, many in keys]
         for (kind, many), job in zip(keys, jobs, strict=True):
             cell, name = job.result(), f"{kind}_{'many' if many else 'one'}"

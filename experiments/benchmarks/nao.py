@@ -5,13 +5,14 @@ from __future__ import annotations
 import importlib.util
 import math
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from importlib.resources import files
 from itertools import pairwise, takewhile
 from pathlib import Path
 
 import numpy as np
 
+from anytime.executors import processes
 from experiments.benchmarks import nao_oracle, nao_worlds, replanning
 from experiments.benchmarks.figures import Benchmark, share_interval
 from experiments.benchmarks.nao_worlds import Life, Outcome, briefing, lived, outcome
@@ -55,7 +56,7 @@ def measure(
     figures: dict[str, float | int | None] = {}
     reasons: dict[str, str] = {}
     figures["golden.max_error_m"] = golden_error()
-    with ProcessPoolExecutor(2) as pool:
+    with processes(2) as pool:
         shortest = list(pool.map(_goes_round, seeds))
         figures |= share_interval("plan.stands_and_goes_round", shortest)
         _scenes(figures, pool, seeds, progress)

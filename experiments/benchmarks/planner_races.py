@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.executors import processes
 from experiments.benchmarks.planner_rivals import PLANNERS
 from planners import Grid, MultiPath, astar, blind_quality, textbook_astar
 from planners import Path as Way
@@ -106,11 +106,11 @@ def _quality(free: NDArray[np.bool_], plan: MultiPath, start: Cell, goal: Cell, 
 
 
 def races(
-    problems: Iterable[Problem], names: Sequence[str], least: int = 0, processes: int = 2
+    problems: Iterable[Problem], names: Sequence[str], least: int = 0, workers: int = 2
 ) -> list[Race]:
     """Race on all problems; counts are the same however many processes share them."""
     listed = list(problems)
-    with ProcessPoolExecutor(processes) as pool:
+    with processes(workers) as pool:
         found = pool.map(
             race, listed, [names] * len(listed), [least] * len(listed), chunksize=_CHUNK
         )
