@@ -106,7 +106,7 @@ def measure(
     progress("synthetic campaigns that stop when they look good")
     figures |= _coverage(2000, seed)
     progress("promises on a machine that is slower")
-    figures |= _calibrated(150 if quick else 400, seed)
+    figures |= _calibrated(*((150, 150) if quick else (400, 1200)), seed)
     return Benchmark("campaign", figures, settings, seed)
 
 
@@ -274,7 +274,7 @@ class _Elsewhere(WorkClock):
         super().spend(module, work * FACTORS.get(module, 1.0) * tail, step)
 
 
-def _calibrated(problems: int, seed: int) -> Figures:
+def _calibrated(problems: int, unseen_problems: int, seed: int) -> Figures:
     """The greatest error of a promise made from profiles of one machine, ten problems of which
     were run again on another, against the mean on problems never seen, lived there."""
     learned = domains(problems, seed + 1, 32)
@@ -283,10 +283,10 @@ def _calibrated(problems: int, seed: int) -> Figures:
     seeds = iter(range(10**6))
     found = calibrate(library, cross, learned, clock=lambda: _Elsewhere(next(seeds)), seed=seed)
     moved, still = compiler.compile(cross, found.library), compiler.compile(cross, library)
-    unseen = domains(problems, seed + 2, 32)
+    unseen = domains(unseen_problems, seed + 2, 32)
     budgets = (0.5, 1.0, 2.0, 4.0)
     lived = np.array([_lived(moved, budget, unseen, seeds) for budget in budgets])
-    drawn = np.random.default_rng(0).integers(problems, size=(RESAMPLES, problems))
+    drawn = np.random.default_rng(0).integers(len(unseen), size=(RESAMPLES, len(unseen)))
     errors, resampled = (
         [
             np.abs(np.array([each.promise(budget) for budget in budgets]) - means).max(axis=-1)
