@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 
-from anytime.executors import maker
+from anytime.executors import processes
 from experiments.reproduction.claims import Claim, Verdict, judge
 from experiments.reproduction.keeping import Kept
 from experiments.reproduction.ways import OURS, PAPER, Way
@@ -26,9 +26,7 @@ def drawn(
     """
     names = {claim.name for claim in claims}
     missing = [seed for seed in seeds if not names <= set(kept.get(_name(seed)) or ())]
-    make = maker("processes:2")
-    assert make is not None
-    with make() as pool:
+    with processes(2) as pool:
         made = pool.map(_draw, [tuple(claims)] * len(missing), missing)
         for done, (seed, draw) in enumerate(zip(missing, made, strict=True), 1):
             kept.keep(_name(seed), draw)
