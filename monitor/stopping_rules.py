@@ -23,7 +23,7 @@ LEVELS = 24  # of seen quality, in the tables
 SLIGHT = 0.1  # weight of a run that is not like the one seen, against one that is
 STIFF = 0.05  # of the slope of a local line
 LAGS = (0.0125, 0.0375, 0.1, 0.25)  # shares of the times over which slopes are taken
-WINDOW = 0.125  # share of the times at either side that is pooled
+WINDOW = 0.25  # share of the times at either side that is pooled
 RIDGE, RIDGE_OF_VALUES = 0.03, 0.2  # of standardised features, times the number of runs
 FEWEST = 10  # looks before a curve is projected
 TINY = 1e-9
@@ -201,6 +201,13 @@ class _Features:
         return index, np.append(seen, (seen - then) / np.maximum(index - before, 1))
 
 
+def waited(seconds: Floats, seen: Floats) -> Floats:
+    """Seconds since quality rose last, at each time; seen: [N, T], result [N, T]."""
+    rises = np.diff(seen, axis=1, prepend=seen[:, :1]) > TINY
+    last = np.maximum.accumulate(np.where(rises, np.arange(len(seconds)), 0), axis=1)
+    return seconds - seconds[last]
+
+
 def _ridge(features: Floats, wanted: Floats, penalty: float) -> tuple[Floats, Floats]:
     """Intercepts [D] and slopes [F, D] of a ridge regression on standardised features."""
     mean, spread = features.mean(axis=0), features.std(axis=0) + TINY
@@ -247,10 +254,13 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
 
     One ridge regression a time, on all runs at the times around it, gives the gain to expect at
     every later time. It forecasts quality and not what going on is worth, as `regression` does:
-    gains are a smoother thing to learn, so that neighbouring times can be pooled.
+    gains are a smoother thing to learn, so that neighbouring times can be pooled. It also sees for
+    how long quality has not risen: runs have plateaus.
     """
-    features = _Features(runs)
-    seen, count = features.of_runs(runs), len(runs.seconds)
+    features, count = _Features(runs), len(runs.seconds)
+    unit = float(np.median(np.diff(runs.seconds))) if count > 1 else 1.0
+    plateau = np.log1p(waited(runs.seconds, runs.seen) / unit)
+    seen = np.concatenate([features.of_runs(runs), plateau[:, :, None]], axis=2)
     width = max(1, round(WINDOW * count))
     models: list[tuple[Floats, Floats]] = []
     for index in range(count - 1):
@@ -274,6 +284,8 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
         if index >= len(models):
             return STOP
         base, slopes = models[index]
+        still = waited(history.seconds, history.quality[None])[0, -1]
+        now = np.append(now, np.log1p(still / unit))
         quality = np.array(intercept + slope * history.quality[-1])
         stay = task.utility(quality, runs.seconds[index])
         go = task.utility(quality + base + now @ slopes, runs.seconds[index + 1 :])

@@ -22,6 +22,7 @@ from planners.frontier import cells_of, least_way, next_base, path_to, pop, sift
 from planners.grids import Grid, endpoints
 from planners.multipath import NO_WAY, Step, way_plan
 from planners.path_finding import Cell
+from planners.problems import known_floors, walked_quality
 from planners.search import DIAGONAL, OUT_OF_BUDGET, SPAN, STRAIGHT
 
 CALLED = "b5d2c8c02942"
@@ -93,7 +94,12 @@ def steps(
         yield Step(0.0, NO_WAY)
 
 
-@anytime.module(estimate=lambda plan: plan.estimate, name="ara")
+@anytime.module(
+    quality=walked_quality,
+    estimate=lambda plan: plan.estimate,
+    name="ara",
+    problems=known_floors,
+)
 def find_path(domain, start, goal):
     """Plan a path with ARA*; `domain` is the probability of being blocked of each cell."""
     for step in steps(domain, start, goal):

@@ -25,6 +25,7 @@ from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.norms import expected_norm, least_norm
 from planners.path_finding import Cell
+from planners.problems import known_floors, walked_quality
 from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
 GRAIN = 500
@@ -270,7 +271,13 @@ def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:
     return {"density": density, "clustering": clustering, "distance": float(distance)}
 
 
-@anytime.module(estimate=lambda plan: plan.estimate, features=features_of, name="atp")
+@anytime.module(
+    quality=walked_quality,
+    estimate=lambda plan: plan.estimate,
+    features=features_of,
+    name="atp",
+    problems=known_floors,
+)
 def find_path(domain, start, goal):
     """Plan a path from start to goal; `domain` is a `Grid` or each cell's probability of being
     blocked."""

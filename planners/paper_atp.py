@@ -18,6 +18,7 @@ from anytime.errors import AnytimeError
 from planners.grids import BELIEVED
 from planners.multipath import MultiPath, Step
 from planners.path_finding import Cell, index_of
+from planners.problems import known_floors, walked_quality
 from planners.refining import (
     ABSTRACT,
     COUNT,
@@ -122,7 +123,12 @@ def refinements(
         yield Step(float(expansions), _multipath(state, pyramid, straight))
 
 
-@anytime.module(estimate=lambda plan: plan.estimate, name="paper_atp")
+@anytime.module(
+    quality=walked_quality,
+    estimate=lambda plan: plan.estimate,
+    name="paper_atp",
+    problems=known_floors,
+)
 def find_path(domain, start, goal):
     """Plan a path from start to goal; `domain` is the probability of being blocked of each cell."""
     for step in steps(domain, start, goal):
