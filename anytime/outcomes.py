@@ -6,13 +6,12 @@ import contextlib
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
 
-import msgspec
 import numpy as np
 
-from anytime.errors import AnytimeError
+from anytime import journals
 from anytime.files import Stored
+from anytime.journals import Journal
 from anytime.profiles import Recording
 
 SCHEMA = "anytime.runs/1"
@@ -74,16 +73,15 @@ class _Line(Stored):
 
 
 class Store:
-    """An open file of outcomes, one a line behind a line that says which campaign they are of."""
+    """An open file of outcomes. kept: those that it held, by problem."""
 
-    def __init__(self, file: BinaryIO, kept: Mapping[str, Outcome]) -> None:
-        self._file = file
-        self.kept = kept
+    def __init__(self, journal: Journal[_Line]) -> None:
+        self._journal = journal
+        self.kept: Mapping[str, Outcome] = {line.problem: _outcome(line) for line in journal.kept}
 
     def append(self, outcome: Outcome) -> None:
         """Add an outcome; it survives the death of this process."""
-        self._file.write(_encoded(outcome))
-        self._file.flush()
+        self._journal.append(_line(outcome))
 
 
 @contextlib.contextmanager
@@ -93,55 +91,12 @@ def opened(path: Path, campaign: Campaign) -> Generator[Store]:
     Raises AnytimeError for a store of another campaign, one that another process writes to, and
     for what is not a store.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a+b") as file:
-        _lock(file, path)
-        file.seek(0)
-        content = file.read()
-        whole = content[: content.rfind(b"\n") + 1]
-        kept = _read(path, whole, campaign)
-        file.truncate(len(whole))
-        if not whole:
-            file.write(msgspec.json.encode(campaign) + b"\n")
-            file.flush()
-        yield Store(file, kept)
+    with journals.opened(path, campaign, _Line) as journal:
+        yield Store(journal)
 
 
-def _lock(file: BinaryIO, path: Path) -> None:
-    try:
-        import fcntl
-    except ImportError:  # not every system has it
-        return
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        raise AnytimeError(f"{path}: another process writes to it; wait for it to end") from None
-
-
-def _read(path: Path, content: bytes, campaign: Campaign) -> dict[str, Outcome]:
-    lines = content.splitlines()
-    kept: dict[str, Outcome] = {}
-    for number, line in enumerate(lines, 1):
-        try:
-            if number > 1:
-                outcome = _decoded(line)
-                kept[outcome.problem] = outcome
-                continue
-            found = msgspec.json.decode(line, type=Campaign)
-        except msgspec.MsgspecError as error:
-            raise AnytimeError(f"{path}:{number}: not one of our runs: {error}") from None
-        for name in campaign.__struct_fields__:
-            here, asked = getattr(found, name), getattr(campaign, name)
-            if here != asked:
-                raise AnytimeError(
-                    f"{path}: holds runs with {name} {here!r}, asked is {asked!r}; start a new "
-                    "campaign, or ask for the same"
-                )
-    return kept
-
-
-def _encoded(outcome: Outcome) -> bytes:
-    line = _Line(
+def _line(outcome: Outcome) -> _Line:
+    return _Line(
         problem=outcome.problem,
         recordings={
             label: [_row(run) for run in runs] for label, runs in outcome.recordings.items()
@@ -153,7 +108,6 @@ def _encoded(outcome: Outcome) -> bytes:
         },
         failed=outcome.failed,
     )
-    return msgspec.json.encode(line) + b"\n"
 
 
 def _row(run: Recording) -> _Row:
@@ -169,8 +123,7 @@ def _row(run: Recording) -> _Row:
     )
 
 
-def _decoded(line: bytes) -> Outcome:
-    stored = msgspec.json.decode(line, type=_Line)
+def _outcome(stored: _Line) -> Outcome:
     recordings = {
         label: tuple(_recording(stored.problem, label, row) for row in rows)
         for label, rows in stored.recordings.items()

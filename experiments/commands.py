@@ -25,7 +25,7 @@ BENCHMARKS = (
     "faults",
     "campaign",
 )
-PARTS = ("zr", "nao")
+PARTS = ("zr", "nao", "rivals")
 
 
 def declare(commands: Any) -> None:
@@ -57,11 +57,16 @@ def declare(commands: Any) -> None:
     parser.add_argument(
         "-o", "--output", type=folder, metavar="DIR", help="for pictures, of those that draw"
     )
-    parser = add_command(commands, "reproduce", reproduce, "the papers' claims beside our figures")
+    parser = add_command(
+        commands, "reproduce", reproduce, "the papers' claims, and rivals, beside our figures"
+    )
     parser.add_argument(
         "parts", nargs="*", metavar="NAME", help=f"of {', '.join(PARTS)}; default: all"
     )
     parser.add_argument("--quick", action="store_true", help="at most 10 minutes on 2 cores")
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with what the folder of the page has kept"
+    )
     parser.add_argument("--seed", type=natural, default=0, help="of the first draw")
     parser.add_argument(
         "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the page"
@@ -123,8 +128,9 @@ def bench(options: argparse.Namespace) -> Answer:
 
 
 def reproduce(options: argparse.Namespace) -> Answer:
-    """Measure what the papers claim, in their way and in ours, and draw it: a table, a page
-    (`reproduce.html`), the same as a document (`results.md`), both from `results.json`.
+    """Measure what the papers claim, in their way and in ours, and every benchmark beside its
+    rivals: a page (`reproduce.html`) and the same as a document (`results.md`), both from
+    `results.json`. What is found is kept in `reproduce.jsonl`, from which `--resume` goes on.
 
     A claim that does not hold is a finding and no failure: the exit code is 0.
     """
@@ -140,6 +146,7 @@ def reproduce(options: argparse.Namespace) -> Answer:
             tuple(dict.fromkeys(options.parts)) or PARTS,
             quick=options.quick,
             seed=options.seed,
+            resume=options.resume,
             output=options.output,
             progress=bar,
         )
@@ -182,11 +189,13 @@ def _shown(value: float | int | None) -> str:
 
 
 def _figures(found: Benchmark) -> dict[str, Any]:
+    from experiments.benchmarks.figures import reasons
+
     machine = {"python": platform.python_version(), "system": platform.platform()}
     return {
         "name": found.name,
         "figures": _nested(found.figures),
-        "settings": dict(found.settings),
+        "settings": {**found.settings, "not_measured": reasons(found)},
         "machine": machine,
         "seed": found.seed,
     }

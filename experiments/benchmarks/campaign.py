@@ -24,7 +24,15 @@ from anytime.calibrating import calibrate
 from anytime.confidence import regret_bounds
 from anytime.outcomes import SCHEMA
 from experiments.benchmarks.clusters import cluster
-from experiments.benchmarks.figures import Benchmark, share_interval
+from experiments.benchmarks.figures import (
+    RESAMPLES,
+    Benchmark,
+    Figures,
+    bounded,
+    median_interval,
+    ratio_interval,
+    share_interval,
+)
 from experiments.domains import MACHINE, Domain, cross, domain, plan_across
 from planners.path_finding import Cell
 from sensing.vision import Sensor
@@ -35,6 +43,7 @@ CLOCK = functools.partial(WorkClock, WORKED)
 TRAP = "ANYTIME_BENCH_TRAP"
 """Names a file: the process that comes upon it removes it and dies of SIGKILL."""
 WANTED = 0.05  # bound of the regret at which a synthetic campaign stops
+_TURNS = 7  # of measuring with a store and without
 SOON = 300  # problems of a synthetic campaign that are looked at first
 TAIL = 0.3  # spread of the logarithm of what a step takes on the other machine
 FACTORS = {"see": 1.5, "plan_across": 3.0}
@@ -89,11 +98,11 @@ def measure(
         "synthetic_campaigns": 2000,
         "not_measured": {},
     }
-    figures: dict[str, float | int | None] = {}
+    figures: Figures = {}
     with tempfile.TemporaryDirectory() as folder:
         figures |= _equality(Path(folder), count, seed, settings, progress)
         progress("overhead of a serial campaign")
-        figures |= _overhead(Path(folder), 200 if quick else 1000)
+        figures |= overhead(Path(folder), 200 if quick else 1000)
     progress("synthetic campaigns that stop when they look good")
     figures |= _coverage(2000, seed)
     progress("promises on a machine that is slower")
@@ -103,7 +112,7 @@ def measure(
 
 def _equality(
     folder: Path, count: int, seed: int, settings: dict[str, Any], progress: Callable[[str], None]
-) -> dict[str, float | int | None]:
+) -> Figures:
     """Whether the ways agree, and runs a second on two processes."""
     problems = domains(count, seed)
     progress(f"{count} runs here")
@@ -165,13 +174,14 @@ def _resumed(folder: Path, count: int, seed: int) -> dict[str, bytes]:
     return _bytes(folder / "resumed", _measured(domains(count, seed), store=store))
 
 
-def _overhead(folder: Path, count: int) -> dict[str, float | int | None]:
-    """Milliseconds that a serial campaign with a store adds to a run, the median of five."""
+def overhead(folder: Path, count: int) -> Figures:
+    """Milliseconds that a serial campaign with a store adds to a run, and how many
+    times as fast it would be without."""
     problems = [anytime_problem(index / count) for index in range(count)]
     clock = functools.partial(WorkClock, Machine("bench").with_rate("nothing", 0.001))
     differences: list[float] = []
     plain: list[float] = []
-    for turn in range(6):
+    for turn in range(_TURNS + 1):
         took: list[float] = []
         for where in ({}, {"executor": "serial", "store": folder / f"{turn}.runs"}):
             began = time.perf_counter()
@@ -183,6 +193,7 @@ def _overhead(folder: Path, count: int) -> dict[str, float | int | None]:
     return {
         "overhead.serial_ms": float(np.median(differences)),
         "plain_ms": float(np.median(plain)),
+        **median_interval("overhead.vs_plain", np.array(plain) / np.add(plain, differences)),
     }
 
 
@@ -193,7 +204,7 @@ def anytime_problem(start: float) -> Any:
     return SimpleNamespace(name=f"{start}", start=start)
 
 
-def _coverage(campaigns: int, seed: int) -> dict[str, float | int | None]:
+def _coverage(campaigns: int, seed: int) -> Figures:
     """How often the true regret is within its bound when a campaign stops by it, and how often an
     interval for a fixed number of runs is, used in the same way."""
     covered: list[bool] = []
@@ -215,6 +226,7 @@ def _coverage(campaigns: int, seed: int) -> dict[str, float | int | None]:
     return {
         **share_interval("coverage.until_regret", covered),
         "coverage.fixed_intervals": float(np.mean(fixed)),
+        **ratio_interval("coverage.vs_fixed_intervals", covered, fixed),
         "coverage.problems_median": float(np.median(ended)),
     }
 
@@ -262,7 +274,7 @@ class _Elsewhere(WorkClock):
         super().spend(module, work * FACTORS.get(module, 1.0) * tail, step)
 
 
-def _calibrated(problems: int, unseen_problems: int, seed: int) -> dict[str, float | int | None]:
+def _calibrated(problems: int, unseen_problems: int, seed: int) -> Figures:
     """The greatest error of a promise made from profiles of one machine, ten problems of which
     were run again on another, against the mean on problems never seen, lived there."""
     learned = domains(problems, seed + 1, 32)
@@ -272,19 +284,32 @@ def _calibrated(problems: int, unseen_problems: int, seed: int) -> dict[str, flo
     found = calibrate(library, cross, learned, clock=lambda: _Elsewhere(next(seeds)), seed=seed)
     moved, still = compiler.compile(cross, found.library), compiler.compile(cross, library)
     unseen = domains(unseen_problems, seed + 2, 32)
-    errors: list[float] = []
-    without: list[float] = []
-    for budget in (0.5, 1.0, 2.0, 4.0):
-        lived: list[float] = []
-        for each in unseen:
-            inputs = {"sensor": each.sensor, "start": each.start, "goal": each.goal}
-            result = moved.run(budget, clock=_Elsewhere(next(seeds)), **inputs)
-            lived.append(plan_across.score(result.value, each) if result else 0.0)
-        errors.append(abs(moved.promise(budget) - float(np.mean(lived))))
-        without.append(abs(still.promise(budget) - float(np.mean(lived))))
+    budgets = (0.5, 1.0, 2.0, 4.0)
+    lived = np.array([_lived(moved, budget, unseen, seeds) for budget in budgets])
+    drawn = np.random.default_rng(0).integers(len(unseen), size=(RESAMPLES, len(unseen)))
+    errors, resampled = (
+        [
+            np.abs(np.array([each.promise(budget) for budget in budgets]) - means).max(axis=-1)
+            for each in (moved, still)
+        ]
+        for means in (lived.mean(axis=1), lived[:, drawn].mean(axis=2).T)
+    )
     ratios = {f"calibrated.ratio_{each.module}": each.ratio for each in found.modules}
     return {
-        "calibrated.promise_error": max(errors),
-        "uncalibrated.promise_error": max(without),
+        "calibrated.promise_error": float(errors[0]),
+        "uncalibrated.promise_error": float(errors[1]),
+        **bounded("calibrated.vs_uncalibrated", errors[1] / errors[0], resampled[1] / resampled[0]),
         **ratios,
     }
+
+
+def _lived(
+    compiled: compiler.CompiledProgram, budget: float, problems: list[Domain], seeds: Iterator[int]
+) -> list[float]:
+    """Qualities achieved on the other machine; nothing in time counts 0."""
+    found: list[float] = []
+    for each in problems:
+        inputs = {"sensor": each.sensor, "start": each.start, "goal": each.goal}
+        result = compiled.run(budget, clock=_Elsewhere(next(seeds)), **inputs)
+        found.append(plan_across.score(result.value, each) if result else 0.0)
+    return found

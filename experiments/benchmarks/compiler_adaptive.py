@@ -22,6 +22,7 @@ from compiler.objectives import Objective
 from compiler.policies import Plan, Policy
 from compiler.tables import Table
 from experiments.benchmarks.compiler_constructs import random_tables, read, sketch
+from experiments.benchmarks.figures import Figures, ratio_interval
 
 STEPS, LEVELS = 60, 21
 COST = 0.004  # of a step
@@ -29,7 +30,7 @@ LUCK = (0.0, 0.25, 0.4)  # chances of bad luck
 LIVES = 2000
 
 
-def measure(count: int, seed: int) -> dict[str, float | int | None]:
+def measure(count: int, seed: int) -> Figures:
     """Figures of `count` chains for each chance of bad luck, and of as many random programs."""
     rng = np.random.default_rng([seed, 9])
     program = chain()
@@ -57,7 +58,7 @@ def measure(count: int, seed: int) -> dict[str, float | int | None]:
     gains = {luck: _gain(pairs) for luck, pairs in worth.items()}
     return {
         "adaptive.below_static": below,
-        "adaptive.gain": _gain([pair for luck in LUCK[1:] for pair in worth[luck]]),
+        **_gain_interval([pair for luck in LUCK[1:] for pair in worth[luck]]),
         **{f"adaptive.gain_luck_{100 * luck:.0f}": gain for luck, gain in gains.items()},
         "adaptive.lived_worst_z": worst,
         "adaptive.count": len(LUCK) * count,
@@ -85,6 +86,13 @@ def _gain(pairs: Sequence[tuple[float, float]]) -> float:
     """Of pairs of (static, adaptive) values, what the adaptive are worth more in all."""
     static, adaptive = np.sum(pairs, axis=0)
     return float(adaptive / static - 1)
+
+
+def _gain_interval(pairs: Sequence[tuple[float, float]]) -> Figures:
+    """The gain on gated profiles with bad luck, with its interval over them."""
+    static, adaptive = np.transpose(pairs)
+    ratio = ratio_interval("adaptive.gain", adaptive, static)
+    return {key: None if value is None else value - 1 for key, value in ratio.items()}
 
 
 def chain(length: int = 3) -> Program:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from compiler.certificates import Response, bracketed, ceiling_factor, floor_factor
 from compiler.division import divide
@@ -18,8 +19,9 @@ from compiler.solving import cheapest
 from compiler.tables import Table
 from experiments.benchmarks import compiler_programs as programs
 from experiments.benchmarks import compiler_rivals as rivals
+from experiments.benchmarks.figures import Figures, median_interval
 
-Figures = dict[str, float | int | None]
+Floats = NDArray[np.float64]
 LEVELS, STEPS, CALLS = 64, 1000, 20  # of the chain
 REPEATS = 11
 
@@ -33,7 +35,7 @@ def engine_figures(
     figures: Figures = {}
     settings: dict[str, object] = {}
     progress("the engine against the time domain and CP-SAT")
-    figures |= _races(rng, settings, 10.0 if quick else 60.0)
+    figures |= races(rng, settings, 10.0 if quick else 60.0)
     progress("programs of 100 modules")
     figures["modules_100_s"] = _hundred(rng)
     progress("shared results of width 4 and 5")
@@ -51,11 +53,11 @@ def cpu_seconds(work: Callable[[], object]) -> float:
     return time.process_time() - started
 
 
-def medians(
+def interleaved(
     rng: np.random.Generator, contestants: Mapping[str, Callable[[], object]], repeats: int
-) -> dict[str, float]:
-    """Median CPU-seconds of each, after one call of each, in a new random order each time. A short
-    one is called as often as takes a millisecond, because clocks are coarse."""
+) -> dict[str, Floats]:
+    """CPU-seconds of each, [repeats], after one call of each, in a new random order each time. A
+    short one is called as often as takes two milliseconds, because clocks are coarse."""
     names = list(contestants)
     batches = {}
     for name in names:
@@ -69,10 +71,10 @@ def medians(
             seen[name].append(
                 cpu_seconds(lambda w=contestants[name], c=calls: [w() for _ in c]) / len(calls)
             )
-    return {name: float(np.median(times)) for name, times in seen.items()}
+    return {name: np.array(times) for name, times in seen.items()}
 
 
-def _races(rng: np.random.Generator, settings: dict[str, object], limit: float) -> Figures:
+def races(rng: np.random.Generator, settings: dict[str, object], limit: float) -> Figures:
     """One chain in both domains; one binary tree; CP-SAT on the chain at half of the budget."""
     profiles = programs.stepped(rng, CALLS, LEVELS, STEPS)
     feeds = programs.chain(CALLS)
@@ -92,7 +94,7 @@ def _races(rng: np.random.Generator, settings: dict[str, object], limit: float) 
         one: list[Factor] = next(new)
         return eliminate(one, one[-1].scope[-1:], MIN_PLUS)
 
-    took = medians(
+    took = interleaved(
         rng,
         {
             "ours": lambda: eliminate(factors, (output,), MIN_PLUS),
@@ -105,12 +107,12 @@ def _races(rng: np.random.Generator, settings: dict[str, object], limit: float) 
     )
     costs = eliminate(factors, (output,), MIN_PLUS)[0].table
     figures: Figures = {
-        "vs_forward": took["forward"] / took["ours"],
-        "vs_forward_new": took["forward"] / took["new"],
-        "vs_forward_by_rows": took["rows"] / took["ours"],
+        **median_interval("vs_forward", took["forward"] / took["ours"]),
+        **median_interval("vs_forward_new", took["forward"] / took["new"]),
+        **median_interval("vs_forward_by_rows", took["rows"] / took["ours"]),
         "forward.mismatches": int((rivals.forward(further, first) != _levels_within(costs)).sum()),
-        "throughput.chain": CALLS * STEPS / took["ours"],
-        "throughput.binary": len(tree) * STEPS / took["binary"],
+        "throughput.chain": CALLS * STEPS / float(np.median(took["ours"])),
+        "throughput.binary": len(tree) * STEPS / float(np.median(took["binary"])),
     }
     settings["vs_forward"] = (
         f"chain of {CALLS}, {LEVELS} levels, {STEPS} steps, all budgets; the order of elimination "
@@ -124,9 +126,11 @@ def _races(rng: np.random.Generator, settings: dict[str, object], limit: float) 
         figures["vs_cpsat"] = None
         settings["vs_cpsat"] = "OR-tools is missing: pip install -e '.[bench]'"
         return figures
-    figures["vs_cpsat"] = spent / took["ours"]
+    figures |= median_interval("vs_cpsat", spent / took["ours"])
     figures["cpsat.level_missing"] = int(_levels_within(costs)[budget]) - level
-    settings["vs_cpsat"] = f"one budget, one worker{f', ended after {limit:.0f} s' * ended}"
+    settings["vs_cpsat"] = (
+        f"one budget, one worker, one search{f', ended after {limit:.0f} s' * ended}"
+    )
     return figures
 
 

@@ -190,7 +190,7 @@ def _return_bound(trials: int, settings: dict[str, Any]) -> dict[str, float | in
     workers.close()
     settings["return_bound.worst"] = worst
     return {
-        "return_bound.kept": float(np.mean(np.array(over) <= BOUND)),
+        **share_interval("return_bound.kept", [late <= BOUND for late in over]),
         "return_bound.worst_ms": max(over),
         "return_bound.p99_ms": float(np.quantile(over, 0.99)),
         "return_bound.floor_worst_ms": max(floors),
@@ -213,7 +213,7 @@ def _halt(count: int, seed: int, settings: dict[str, Any]) -> dict[str, float | 
     told = [each.told for each in seen if each.kind in link_faults.TOLD]
     return {
         "halt.worst_s": max(each.halt for each in seen),
-        "halt.within_1_s": float(np.mean([each.halt <= HALT for each in walked])),
+        **share_interval("halt.within_1_s", [each.halt <= HALT for each in walked]),
         "halt.count": len(walked),
         "halt.commands_after_stop": sum(each.after for each in seen),
         "halt.unwatched_motions": sum(each.unwatched for each in seen),

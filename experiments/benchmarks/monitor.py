@@ -4,14 +4,14 @@ decision takes, and stopping rules on recorded traces."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments import shipped
-from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.figures import Benchmark, Figures, median_interval, ratio_interval
 from experiments.benchmarks.monitor_gate import gate_figures
 from experiments.benchmarks.monitor_kinds import SLOWER, kinds
 from experiments.benchmarks.monitor_knobs import knob_figures
@@ -46,6 +46,7 @@ MISSIONS = 5_000  # that check each computed worth
 TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
+_PARTS = 20  # into which they are divided, in their order, for an interval
 TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
 NEWS = 60  # missions in which a deadline becomes known
 VISITS = 60  # rounds through several goals
@@ -64,7 +65,7 @@ def measure(
     has one."""
     missing: dict[str, str] = {}
     settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
-    figures: dict[str, float | int | None] = {}
+    figures: Figures = {}
     found: dict[str, list[float]] = {}
     deviations: list[float] = []
     solving: list[float] = []
@@ -77,6 +78,9 @@ def measure(
     for policy, values in found.items():
         figures[f"loss.{policy}.mean"] = float(np.mean(values))
         figures[f"loss.{policy}.worst"] = float(np.max(values))
+    kept = {policy: 1.0 - np.array(values) for policy, values in found.items()}
+    for policy in ("paper", "inter", "fixed"):
+        figures |= ratio_interval(f"loss.vs_{policy}", kept["optimal"], kept[policy])
     figures["loss.paper.at_least_4_percent"] = int(np.sum(np.array(found["paper"]) >= 0.04))
     figures["check.count"] = len(deviations)
     figures["check.within_three_errors"] = float(np.mean(np.abs(deviations) <= 3.0))
@@ -163,7 +167,7 @@ def _deviation(worth: float, nets: Floats) -> float:
 
 def decision_times(
     table: DecisionTable, rng: np.random.Generator, decisions: int = DECISIONS
-) -> Mapping[str, float]:
+) -> Figures:
     """Microseconds of a decision by look-up, and how many times longer numpy's argmax of the
     paper's rule takes; both in states drawn evenly, interleaved, less an empty call."""
     process = table.process
@@ -192,9 +196,11 @@ def decision_times(
             theirs.append(clock() - began)
     floor = float(np.median(empty))
     times = np.array(ours) - floor
-    median = float(np.median(times))
+    count = min(_PARTS, len(theirs))
+    parts = zip(*(np.array_split(each, count) for each in (theirs, ours)), strict=True)
+    ratios = [(np.median(one) - floor) / (np.median(other) - floor) for one, other in parts]
     return {
-        "decision.median_us": median / 1e3,
+        "decision.median_us": float(np.median(times)) / 1e3,
         "decision.p99_us": float(np.quantile(times, 0.99)) / 1e3,
-        "decision.vs_numpy": (float(np.median(theirs)) - floor) / median,
+        **median_interval("decision.vs_numpy", ratios),
     }

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from experiments.benchmarks.figures import Figures, ratio_interval
 from monitor.stopping import (
     Learner,
     Runs,
@@ -114,7 +115,7 @@ def cross_validate(
 
 def trace_figures(
     folder: Path, seed: int, progress: Callable[[str], None]
-) -> tuple[dict[str, float | int | None], dict[str, object]]:
+) -> tuple[Figures, dict[str, object]]:
     """Figures under `traces.`, and the settings: which rules were chosen in how many folds.
 
     Raises AnytimeError for a folder without traces.
@@ -122,7 +123,7 @@ def trace_figures(
     paths = sorted(folder.glob("*.json"))
     if not paths:
         raise AnytimeError(f"--traces {folder}: no .json file in it")
-    figures: dict[str, float | int | None] = {}
+    figures: Figures = {}
     settings: dict[str, object] = {}
     means: dict[str, list[float]] = {"chosen": [], "fixed": []}
     worse = 0
@@ -138,6 +139,6 @@ def trace_figures(
     tsp = [loss for path, loss in zip(paths, means["chosen"], strict=True) if "tsp" in path.stem]
     figures["traces.loss"] = float(np.mean(means["chosen"]))
     figures["traces.loss_tsp"] = float(np.mean(tsp)) if tsp else None
-    figures["traces.vs_fixed"] = float(np.sum(means["chosen"]) / np.sum(means["fixed"]))
+    figures |= ratio_interval("traces.vs_fixed", means["chosen"], means["fixed"])
     figures["traces.worse_than_fixed"] = worse
     return figures, settings

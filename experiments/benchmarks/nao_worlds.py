@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from experiments.benchmarks.figures import share_interval
+from experiments.benchmarks.figures import Figures, ratio_interval, share_interval
 from monitor.endings import Ending
 from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_missions import NaoBriefing, brief
@@ -87,7 +87,7 @@ def outcome(seed: int, explained: bool) -> Outcome:
     )
 
 
-def figures(outcomes: Sequence[Outcome]) -> dict[str, float | int | None]:
+def figures(outcomes: Sequence[Outcome]) -> Figures:
     """Shares of the worlds, with their intervals; success over those whose goal can be reached."""
     able = [each for each in outcomes if each.reachable]
     missed = [
@@ -105,10 +105,15 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, float | int | None]:
         "unmonitored_knowing_drift_success": [o.knowing.arrived for o in able if o.knowing],
         "unmonitored_noiseless_success": [o.unerring.arrived for o in able if o.unerring],
     }
-    found: dict[str, float | int | None] = {}
+    found: Figures = {}
     for name, held in shares.items():
         if held:
             found |= share_interval(f"worlds.{name}", held)
+    arrived = shares["monitored_success"]
+    found |= ratio_interval("worlds.vs_unmonitored", arrived, shares["unmonitored_success"])
+    if any(o.unerring for o in able):
+        both = [(o.monitored.reached, o.unerring.arrived) for o in able if o.unerring]
+        found |= ratio_interval("worlds.vs_noiseless", *zip(*both, strict=True))
     found["worlds.unmonitored_missed_median_m"] = float(np.median(missed)) if missed else 0.0
     return found
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.figures import Benchmark, Figures, bounded, ratio_interval
 from experiments.benchmarks.planner_checks import (
     below_exact,
     overruns,
@@ -23,9 +23,12 @@ from experiments.benchmarks.planner_races import (
     LARGE,
     Problem,
     Race,
+    Track,
     curve,
     races,
+    resampled,
     share_at,
+    shares_at,
     timed,
 )
 from experiments.benchmarks.planner_sampling import sampled
@@ -64,12 +67,13 @@ def measure(
         if not found:
             continue
         for level, name in ((0.97, "q97"), (0.99, "q99")):
-            figures[f"{key}.work_{name}"] = share_at([each.tracks["atp"] for each in found], level)
+            tracks = [each.tracks["atp"] for each in found]
+            figures |= share_figures(f"{key}.work_{name}", tracks, level)
         progress(f"{key}: time beside A*")
-        figures |= _times(key, found, 1 if quick else 3)
+        figures |= times(key, found, 1 if quick else 3)
     figures["maps.count"] = len(raced["maps"])
     _put_completion(figures, raced)
-    _put_against(figures, raced)
+    figures |= against(raced)
     progress("published optima")
     if folder is None:
         reason = "no folder of maps: give --maps DIR or set ANYTIME_MAPS"
@@ -165,14 +169,14 @@ def _race_all(
     return found
 
 
-def _times(key: str, found: Sequence[Race], repeats: int) -> dict[str, float | None]:
+def times(key: str, found: Sequence[Race], repeats: int) -> Figures:
     """Shares of A*'s time at which the mean quality reaches .97 and .99; on maps also with what
     earlier queries on the same map have found out."""
-    figures: dict[str, float | None] = {}
+    figures: Figures = {}
     timed(found[0], repeats=1)  # loads machine code, which the races did in other processes
     tracks = [timed(each, repeats=repeats) for each in found]
     for level, name in ((0.97, "q97"), (0.99, "q99")):
-        figures[f"{key}.time_{name}"] = share_at(tracks, level)
+        figures |= share_figures(f"{key}.time_{name}", tracks, level)
     if key == "maps":
         grids: dict[Path | None, Grid] = {}
         for each in found:
@@ -180,7 +184,7 @@ def _times(key: str, found: Sequence[Race], repeats: int) -> dict[str, float | N
                 grids[each.problem.map] = Grid.known(each.problem.load()[0])
             timed(each, repeats=1, grid=grids[each.problem.map])
         kept = [timed(each, repeats=repeats, grid=grids[each.problem.map]) for each in found]
-        figures["maps.time_kept_q97"] = share_at(kept, 0.97)
+        figures |= share_figures("maps.time_kept_q97", kept, 0.97)
     return figures
 
 
@@ -189,25 +193,54 @@ def _put_completion(figures: dict[str, float | int | None], raced: dict[str, lis
     everything = [each for found in raced.values() for each in found]
     hard = [each for key, found in raced.items() if key.startswith("hard.") for each in found]
     figures["final.quality"] = min(each.final["atp"] for each in everything)
-    figures["final.work"] = float(np.mean([each.total["atp"] for each in everything]))
+    figures |= _mean_interval("final.work", [each.total["atp"] for each in everything])
     figures["hard.total_work_max"] = max(each.total["atp"] for each in hard)
     random = [each for key, found in raced.items() if key != "maps" for each in found]
     for name, found in (("random", random), ("maps", raced["maps"])):
         first = [each.tracks["atp"][0][0] for each in found]
-        figures[f"first_plan.{name}.work"] = float(np.mean(first)) if first else None
+        key = f"first_plan.{name}.work"
+        figures |= _mean_interval(key, first) if first else {key: None}
 
 
-def _put_against(figures: dict[str, float | int | None], raced: dict[str, list[Race]]) -> None:
-    """Least difference of mean quality at equal work: ours - theirs, over families and shares."""
+def _mean_interval(key: str, values: Sequence[float]) -> Figures:
+    """A mean over instances with its interval."""
+    return ratio_interval(key, values, np.ones(len(values)))
+
+
+def against(raced: dict[str, list[Race]]) -> Figures:
+    """Least difference of mean quality at equal work, ours - theirs, over families and shares; and
+    by family, how many times our work until .97 takes the rival."""
+    figures: Figures = {}
     for rival in ("ara", "rwa"):
         differences: dict[str, float] = {}
         for key, found in raced.items():
             if found and rival in found[0].tracks:
+                family = key.replace(".", "_")
                 apart = curve(found, "atp", _SHARES) - curve(found, rival, _SHARES)
-                differences[key] = float(apart.min())
-        for key, difference in differences.items():
-            figures[f"against.{rival}.by_family.{key.replace('.', '_')}"] = difference
+                differences[family] = float(apart.min())
+                figures |= _times_the_work(f"against.{rival}.work_q97.{family}", found, rival)
+        for family, difference in differences.items():
+            figures[f"against.{rival}.by_family.{family}"] = difference
         figures[f"against.{rival}.worst"] = min(differences.values())
+    return figures
+
+
+def share_figures(key: str, tracks: Sequence[Track], level: float) -> Figures:
+    """Where a level is reached, bootstrapped over instances; None where it is not."""
+    share = share_at(tracks, level)
+    if share is None:
+        return {key: None}
+    return bounded(key, share, shares_at(tracks, level, resampled(len(tracks))))
+
+
+def _times_the_work(key: str, found: Sequence[Race], rival: str) -> Figures:
+    """A rival's work until .97 over ours, on the same instances."""
+    rows = np.vstack([np.full(len(found), 1.0 / len(found)), resampled(len(found))])
+    theirs, ours = (
+        shares_at([each.tracks[name] for each in found], 0.97, rows) for name in (rival, "atp")
+    )
+    ratios = np.where(np.isfinite(ours), theirs / ours, np.nan)
+    return bounded(key, float(ratios[0]), np.nan_to_num(ratios[1:], nan=0.0))
 
 
 def _put_paper(
@@ -260,6 +293,4 @@ def _put(
 ) -> None:
     """Add a figure with its 95 % interval, bootstrapped over instances."""
     drawn = values[rng.integers(0, len(values), (_RESAMPLES, len(values)))]
-    low, high = np.quantile(statistic(drawn, axis=1), (0.025, 0.975))
-    figures[key] = float(statistic(values))
-    figures[f"{key}_low"], figures[f"{key}_high"] = float(low), float(high)
+    figures |= bounded(key, float(statistic(values)), statistic(drawn, axis=1))

@@ -18,9 +18,12 @@ from planners import Path as Way
 from planners.path_finding import Cell
 from sensing import instance, read_map, read_scenarios
 
+Track = Sequence[tuple[float, float]]
+"""(share of A*'s work or time, quality) of each plan, in the order in which they came."""
 LARGE = 20_000
 """Scenarios on maps on which A* expands more than this are raced on."""
 _APART = 1.3  # the paper's plans are walked when the work has grown by so much
+_RESAMPLES = 500
 _CHUNK = 4  # instances a worker takes at a time
 _TIMED = 0.9925  # a timed run is over when its plan is this good …
 ENOUGH = 0.6  # … or when it has done so large a share of A*'s work
@@ -119,23 +122,45 @@ def curve(found: Sequence[Race], name: str, shares: NDArray[np.float64]) -> NDAr
     return _mean([each.tracks[name] for each in found], shares)
 
 
-def share_at(tracks: Sequence[Sequence[tuple[float, float]]], level: float) -> float | None:
+def share_at(tracks: Sequence[Track], level: float) -> float | None:
     """Least share at which the mean quality of the best plan so far reaches a level."""
-    shares = np.unique([share for track in tracks for share, _ in track])
-    reached = np.flatnonzero(_mean(tracks, shares) >= level)
-    return float(shares[reached[0]]) if len(reached) else None
+    found = float(shares_at(tracks, level, np.full((1, len(tracks)), 1.0 / len(tracks)))[0])
+    return found if np.isfinite(found) else None
 
 
-def _mean(
-    tracks: Sequence[Sequence[tuple[float, float]]], shares: NDArray[np.float64]
+def shares_at(
+    tracks: Sequence[Track], level: float, weights: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    total = np.zeros(len(shares))
-    for track in tracks:
+    """The same, with each row of weights of the tracks [rows, tracks]; inf where it never does."""
+    shares = np.unique([share for track in tracks for share, _ in track])
+    qualities = _qualities(tracks, shares)
+    found = np.full(len(weights), np.inf)
+    for row, weight in enumerate(weights):
+        reached = np.flatnonzero(weight @ qualities >= level)
+        if len(reached):
+            found[row] = shares[reached[0]]
+    return found
+
+
+def resampled(count: int) -> NDArray[np.float64]:
+    """Weights of instances in samples of them, [rows, count], for 95 % intervals."""
+    drawn = np.random.default_rng(0).integers(count, size=(_RESAMPLES, count))
+    return np.stack([np.bincount(row, minlength=count) for row in drawn]) / count
+
+
+def _mean(tracks: Sequence[Track], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    return _qualities(tracks, shares).sum(axis=0) / max(1, len(tracks))
+
+
+def _qualities(tracks: Sequence[Track], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quality of the best plan so far of each track at each share, [tracks, shares]."""
+    rows = np.zeros((len(tracks), len(shares)))
+    for row, track in zip(rows, tracks, strict=True):
         at = np.array([share for share, _ in track])
         best = np.maximum.accumulate([quality for _, quality in track]) if track else np.zeros(0)
         index = np.searchsorted(at, shares, side="right") - 1
-        total += np.where(index >= 0, np.append(best, 0.0)[index], 0.0)
-    return total / max(1, len(tracks))
+        row[:] = np.where(index >= 0, np.append(best, 0.0)[index], 0.0)
+    return rows
 
 
 def timed(found: Race, *, repeats: int = 3, grid: Grid | None = None) -> list[tuple[float, float]]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import anytime
 from anytime import Module
+from experiments.benchmarks.figures import Figures, ratio_interval
 from planners import astar
 from planners.path_finding import Cell
 from sensing import instance
@@ -66,7 +67,7 @@ def sampling_module(name: str) -> Module:
     return plan
 
 
-def sampled(seed: int) -> tuple[dict[str, float | None], dict[str, str]]:
+def sampled(seed: int) -> tuple[Figures, dict[str, str]]:
     """(figures, what is not measured): how many floors they solve in 100 times our A*'s time (at
     least 0.1 s), and the mean quality of the ways then, no way counting 0."""
     keys = [
@@ -75,7 +76,7 @@ def sampled(seed: int) -> tuple[dict[str, float | None], dict[str, str]]:
     if importlib.util.find_spec("ompl") is None:
         reason = "ompl is not installed: pip install 'anytime-robots[bench]'"
         return dict.fromkeys(keys), dict.fromkeys(keys, reason)
-    figures: dict[str, float | None] = {}
+    figures: Figures = {}
     for name in SAMPLERS:
         module, qualities = sampling_module(name), []
         for family, size in _FLOORS:
@@ -87,6 +88,7 @@ def sampled(seed: int) -> tuple[dict[str, float | None], dict[str, str]]:
                 assert best is not None
                 found = anytime.run(module, free, start, goal, seconds=seconds)
                 qualities.append(best.length / found.value if found else 0.0)
+        ones = np.ones(len(qualities))
         figures[f"sampling.{name.lower()}.solved"] = float(np.mean(np.array(qualities) > 0))
-        figures[f"sampling.{name.lower()}.quality"] = float(np.mean(qualities))
+        figures |= ratio_interval(f"sampling.{name.lower()}.quality", qualities, ones)
     return figures, {}

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,11 +20,19 @@ from typing import Any
 import numpy as np
 
 from experiments.benchmarks import replanning
-from experiments.benchmarks.figures import Benchmark
+from experiments.benchmarks.figures import (
+    RESAMPLES,
+    Benchmark,
+    Figures,
+    bounded,
+    median_interval,
+    ratio_interval,
+)
 from experiments.benchmarks.replanning import Summary, Timed, sitting
 from experiments.benchmarks.rivals import (
     RIVALS,
     Problem,
+    Rival,
     Stop,
     cpp_program,
     installed,
@@ -79,17 +87,19 @@ def measure(
     settings: dict[str, object] = {"seeds": len(seeds), "not_measured": reasons}
 
     progress("evaluations a second: native, plain, C++, Optuna")
-    _speeds(figures, reasons, settings, pairs=5 if quick else 9)
+    figures |= speeds(7 if quick else 9, reasons, settings)
     progress(f"{len(seeds)} seeds of each scenario of [PRP16] §4")
     _scenarios(figures, seeds, few)
     progress("rivals on the NAO's plan")
-    _rivals(figures, reasons, settings, few)
+    figures |= peers(installed(), few, 4.0, settings)
+    settings["rivals_not_installed"] = missing()
     progress("moving peaks")
     _peaks(figures, settings, few, periods=30 if quick else 100)
     progress("a control loop beside the query")
-    figures["control_loop.p95_ratio"] = _control_loop(3 if quick else 7, 2.0)
+    loop = _control_loop(3 if quick else 7, 2.0)
+    figures |= median_interval("control_loop.p95_ratio", loop)
     progress("the start of a process; plain against native")
-    figures["start.cold_over_cached"] = _start(settings)
+    figures |= median_interval("start.cold_over_cached", _start(settings))
     figures["parity.mismatches"] = _parity(range(seed, seed + (200 if quick else 1000)))
     if full:
         progress("ablation")
@@ -108,27 +118,30 @@ def _rate(searched: Query, generations: int) -> float:
     return (searched.evaluations - before) / (time.thread_time() - begun)
 
 
-def _speeds(figures: dict, reasons: dict, settings: dict, pairs: int) -> None:
+def speeds(pairs: int, reasons: dict, settings: dict) -> Figures:
+    """Evaluations a CPU-second over those of others, measured in turns; why one is null goes to
+    `reasons`."""
+    figures: Figures = {}
     ratios: list[float] = []
     for turn in range(pairs):
         native, plain = (Query(plan, sitting(), seed=turn, native=form) for form in (True, False))
         native.step(5)
         plain.step(5)
         ratios.append(_rate(native, _GENERATIONS) / _rate(plain, 20))
-    figures["vs_plain.nao"] = float(np.median(ratios))
-    figures["vs_plain.nao_low"], figures["vs_plain.nao_high"] = min(ratios), max(ratios)
+    figures |= median_interval("vs_plain.nao", ratios)
     if cpp_program.compiler() is None:
         for key in ("vs_cpp.nao", "vs_cpp_tags.nao"):
             figures[key], reasons[key] = None, "no g++ on this machine"
     else:
         for key, variant in (("vs_cpp.nao", "slots"), ("vs_cpp_tags.nao", "tags")):
             found = cpp_program.compare(sitting(), variant, pairs=pairs)
-            figures[key] = found.ratio if found.same == 1.0 else None
-            if found.same < 1.0:
-                reasons[key] = "the C++ program made other choices"
+            if found.same == 1.0:
+                figures |= median_interval(key, found.ratios)
+            else:
+                figures[key], reasons[key] = None, "the C++ program made other choices"
     if "optuna.random" not in installed():
         figures["vs_optuna.nao"], reasons["vs_optuna.nao"] = None, "Optuna is not installed"
-        return
+        return figures
     problem = _problem()
     ratios = []
     for turn in range(pairs):
@@ -136,8 +149,8 @@ def _speeds(figures: dict, reasons: dict, settings: dict, pairs: int) -> None:
         ours.step(5)
         trail = RIVALS["optuna.random"].search(problem, 0.5, -math.inf, turn)
         ratios.append(_rate(ours, _GENERATIONS) / trail.rate)
-    figures["vs_optuna.nao"] = float(np.median(ratios))
     settings["evaluations_a_second"] = round(_rate(Query(plan, sitting()), _GENERATIONS))
+    return figures | median_interval("vs_optuna.nao", ratios)
 
 
 def _problem() -> Problem:
@@ -199,27 +212,41 @@ def _printed_plan(walks: np.ndarray) -> dict[tuple[str, int], Any]:
 # --- Rivals.
 
 
-def _rivals(figures: dict, reasons: dict, settings: dict, seeds: Iterable[int]) -> None:
+def peers(
+    rivals: Mapping[str, Rival], seeds: Iterable[int], budget: float, settings: dict
+) -> Figures:
+    """CPU-seconds to a good plan of the rival that is fastest, over ours: the median of seeds. One
+    that does not arrive within its budget of seconds counts as that."""
     target = replanning.least((0.0, 0.0), replanning.GOAL, replanning.OBSTACLE, 3.0)
     target += replanning.CLOSE
     problem = _problem()
     ours: list[float] = []
-    theirs: dict[str, list[float]] = {name: [] for name in installed()}
-    budget, late = 4.0, set[str]()
+    theirs: dict[str, list[float]] = {name: [] for name in rivals}
+    late = set[str]()
     for seed in seeds:
         ours.append(_time_to(target, seed))
-        for name, rival in installed().items():
+        for name, rival in rivals.items():
             trail = rival.search(problem, budget, target, seed)
             theirs[name].append(trail.reached_seconds or budget)
             if trail.reached_seconds is None:
                 late.add(name)
     medians = {name: float(np.median(times)) for name, times in theirs.items()}
     best = min(medians, key=lambda name: medians[name])
-    figures["vs_best_peer.nao"] = medians[best] / float(np.median(ours))
     settings["best_peer"] = best
     settings["seconds_to_first_plan"] = {"ours": float(np.median(ours)), **medians}
     settings["reached_not_always"] = sorted(late)
-    settings["rivals_not_installed"] = missing()
+    return _medians_ratio("vs_best_peer.nao", np.array(theirs[best]), np.array(ours))
+
+
+def _medians_ratio(key: str, theirs: np.ndarray, ours: np.ndarray) -> Figures:
+    """The ratio of two medians, resampled apart: how long one search takes has nothing to do with
+    how long another takes from the same seed."""
+    rng = np.random.default_rng(0)
+    one, other = (
+        np.median(times[rng.integers(len(times), size=(RESAMPLES, len(times)))], axis=1)
+        for times in (theirs, ours)
+    )
+    return bounded(key, float(np.median(theirs) / np.median(ours)), one / other)
 
 
 def _time_to(target: float, seed: int) -> float:
@@ -234,8 +261,11 @@ def _peaks(figures: dict, settings: dict, seeds: Iterable[int], periods: int) ->
         name: [offline_error(peer, seed, periods) for seed in seeds] for name, peer in PEERS.items()
     }
     means = {name: float(np.mean(found)) for name, found in errors.items()}
-    figures["moving_peaks.offline_error"] = float(np.mean([_ours(seed, periods) for seed in seeds]))
-    figures["moving_peaks.best_peer"] = min(means.values())
+    best = min(means, key=lambda name: means[name])
+    ours = [_ours(seed, periods) for seed in seeds]
+    figures["moving_peaks.offline_error"] = float(np.mean(ours))
+    figures["moving_peaks.best_peer"] = means[best]
+    figures |= ratio_interval("moving_peaks.vs_best_peer", errors[best], ours)
     settings["moving_peaks"] = means
 
 
@@ -257,8 +287,8 @@ def _ours(seed: int, periods: int) -> float:
 # --- Beside a control loop, at the start, and plain against native.
 
 
-def _control_loop(turns: int, seconds: float) -> float:
-    """p95 of the lateness of a 100 Hz loop, beside the query over alone."""
+def _control_loop(turns: int, seconds: float) -> list[float]:
+    """p95 of the lateness of a 100 Hz loop, beside the query over alone, of each turn."""
     searched = Query(plan, sitting(), seed=1)
     searched.step()
     ratios: list[float] = []
@@ -267,7 +297,7 @@ def _control_loop(turns: int, seconds: float) -> float:
         with searched.background():
             beside = _lateness(seconds)
         ratios.append(beside / alone)
-    return float(np.median(ratios))
+    return ratios
 
 
 def _lateness(seconds: float) -> float:
@@ -293,8 +323,9 @@ print(started - begun, time.process_time() - started)
 """
 
 
-def _start(settings: dict) -> float:
-    """CPU-seconds of making the NAO's model native in a new process, over those of loading it.
+def _start(settings: dict) -> np.ndarray:
+    """CPU-seconds of making the NAO's model native in a new process, over those of loading it, of
+    each of three.
 
     What starts the compiler, whatever it then compiles or loads, is told apart, like the imports.
     """
@@ -319,7 +350,7 @@ def _start(settings: dict) -> float:
                 times.append(took)
     seconds = {"cold": cold, "cached": cached, "engine": engine}
     settings["start_seconds"] = {name: float(np.median(found)) for name, found in seconds.items()}
-    return float(np.median(np.array(cold) / np.array(cached)))
+    return np.array(cold) / np.array(cached)
 
 
 def _parity(seeds: Iterable[int]) -> int:

@@ -8,7 +8,20 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from experiments.reproduction.rows import COMMANDS, PAPERS, PART, Row, cell, rows_of, shown, summary
+from experiments.reproduction.rival_table import STYLE, rival_table
+from experiments.reproduction.rows import (
+    BEYOND,
+    COMMANDS,
+    PAPERS,
+    PART,
+    READ,
+    RIVALS,
+    Row,
+    cell,
+    rows_of,
+    shown,
+    summary,
+)
 
 CLAIMED = "what is claimed"
 _KIND = {CLAIMED: "text"}  # columns of words
@@ -19,13 +32,27 @@ body { margin: 0 auto; max-width: 76rem; padding: 1rem; font: 1rem/1.5 system-ui
 table { border-collapse: collapse; font-size: .9rem; }
 th, td { padding: .25rem .6rem; text-align: right; border-bottom: 1px solid #ddd; }
 th:first-child, th.text, td:first-child, td.text { text-align: left; }
-td { white-space: nowrap; }
+th, td { white-space: nowrap; }
 td.text { white-space: normal; min-width: 14rem; }
 td.holds { color: #006644; } td.no, td.only { color: #a33d00; font-weight: 600; }
 figure { margin: 1.5rem 0; } figure svg { max-width: 100%; height: auto; }
+.sweep { font-size: .85rem; } .sweep th, .sweep td { padding: .25rem .4rem; }
+figure.broad svg { min-width: 38rem; }
 figcaption { font-size: .9rem; color: #444; max-width: 50rem; }
 pre { background: #f4f4f4; padding: .5rem .8rem; overflow-x: auto; }
+ul.cut { font-size: .9rem; color: #444; padding-left: 1.2rem; }
+@media (max-width: 40rem) {
+  .rows { display: block; } .rows tbody { display: block; } .rows tr.head { display: none; }
+  .rows tr { display: flex; flex-wrap: wrap; gap: 0 1rem; padding: .4rem 0;
+             border-bottom: 1px solid #ddd; }
+  .rows td { border: 0; padding: 0; } .rows td.text { flex-basis: 100%; }
+  .rows td[data-is]::before { content: attr(data-is) " "; color: #555; }
+  .rows td.name { font-weight: 600; }
+  .sweep td:first-child, .sweep th:first-child { position: sticky; left: 0; background: #fff;
+    white-space: normal; min-width: 7rem; }
+}
 """
+_BROAD = 500  # points of width beyond which a picture is not shrunk to a narrow window
 
 
 def page(told: Mapping[str, Any], folder: Path) -> str:
@@ -36,9 +63,9 @@ def page(told: Mapping[str, Any], folder: Path) -> str:
     parts = [
         '<!doctype html><html lang="en"><meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>Both papers' claims beside ours</title><style>{_STYLE}</style>",
+        f"<title>Both papers' claims beside ours</title><style>{_STYLE}{STYLE}</style>",
         f"<h1>Both papers' claims beside ours</h1><p>{escape(summary(told))} {escape(machine)}.",
-        *(escape(cut) for cut in settings["cut"]),
+        _cut(settings["cut"]),
         "<p>A figure of the paper's own way is judged; ours stands beside it. Of a behaviour it is "
         "the share of the draws that show it, and 95 % must; of a mean, the 95 % interval must "
         "contain what is printed or be better; of a single drawing, what is printed must lie "
@@ -56,22 +83,34 @@ def page(told: Mapping[str, Any], folder: Path) -> str:
                 parts.append(_figure(folder / picture["file"], picture["caption"]))
         if paper == "zr":
             parts += [_sweep(sweep) for sweep in settings["sweeps"]]
+    if settings["comparisons"]:
+        parts.append(f"<h2>{escape(BEYOND)}</h2><p>{escape(READ)}")
+        parts.append(f"<pre>{_command(RIVALS, told)}</pre>")
+        parts.append(rival_table(told))
     return "\n".join(parts) + "\n"
 
 
-def _command(paper: str, told: Mapping[str, Any]) -> str:
-    quick = " --quick" if told["settings"]["cut"] else ""
-    return escape(f"{COMMANDS[paper]} --seed {told['seed']}{quick}")
+def _cut(cut: Sequence[str]) -> str:
+    lines = "".join(f"<li>{escape(line)}" for line in cut)
+    return f'<ul class="cut">{lines}</ul>' if cut else ""
+
+
+def _command(part: str, told: Mapping[str, Any]) -> str:
+    quick = " --quick" if told["settings"]["quick"] else ""
+    return escape(f"{COMMANDS[part]} --seed {told['seed']}{quick}")
 
 
 def _claims(rows: Sequence[Row]) -> str:
     head = ("claim", CLAIMED, "paper", "its way", "low to high", "ours", "")
-    body = [
-        f'<tr><td>{escape(r.name)}<td class="text">{escape(r.text)}<td>{r.paper}<td>{r.ours}'
-        f'<td>{r.bounds}<td>{r.best}<td class="{r.sign.split()[0]}">{r.sign}'
-        for r in rows
-    ]
-    return _table(head, body)
+    body: list[str] = []
+    for r in rows:
+        figures = zip(head[2:6], (r.paper, r.ours, r.bounds, r.best), strict=True)
+        cells = "".join(f'<td data-is="{name}">{figure}' for name, figure in figures)
+        body.append(
+            f'<tr><td class="name">{escape(r.name)}<td class="text">{escape(r.text)}{cells}'
+            f'<td class="{r.sign.split()[0]}">{r.sign}'
+        )
+    return _table(head, body, "rows")
 
 
 def _sweep(sweep: Mapping[str, Any]) -> str:
@@ -80,12 +119,16 @@ def _sweep(sweep: Mapping[str, Any]) -> str:
         f"<tr><td>{escape(name)}" + "".join(f"<td>{cell(found)}" for found in row)
         for name, row in sweep["rows"].items()
     ]
-    return f"<h3>{escape(sweep['title'])}</h3>" + _table(("", *sweep["columns"]), [printed, *body])
+    table = _table(("", *sweep["columns"]), [printed, *body], "sweep")
+    return f"<h3>{escape(sweep['title'])}</h3>{table}"
 
 
-def _table(head: Sequence[str], body: Sequence[str]) -> str:
+def _table(head: Sequence[str], body: Sequence[str], kind: str) -> str:
     titles = "".join(f'<th class="{_KIND.get(title, "")}">{escape(title)}' for title in head)
-    return f'<div class="wide"><table><tr>{titles}{"".join(body)}</table></div>'
+    return (
+        f'<div class="wide"><table class="{kind}"><tr class="head">{titles}{"".join(body)}'
+        "</table></div>"
+    )
 
 
 def _figure(file: Path, caption: str) -> str:
@@ -98,4 +141,9 @@ def _figure(file: Path, caption: str) -> str:
     svg = re.sub(r'href="#([^"]+)"', rf'href="#{own}-\1"', svg)
     label = f'<svg role="img" aria-label="{escape(caption)}"'
     svg = svg.replace("<svg", label, 1)
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+    widths = re.findall(r'\bwidth="([\d.]+)pt"', svg)  # of the whole, as matplotlib says it
+    broad = ' class="broad"' if max(map(float, widths), default=0.0) > _BROAD else ""
+    return (
+        f'<figure{broad}><div class="wide">{svg}</div><figcaption>{escape(caption)}</figcaption>'
+        "</figure>"
+    )

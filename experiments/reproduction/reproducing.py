@@ -5,15 +5,20 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 from experiments.benchmarks.figures import Benchmark
-from experiments.reproduction.claims import Claim, Verdict, judge
+from experiments.reproduction import rivals
+from experiments.reproduction.claims import Claim, Verdict
+from experiments.reproduction.draws import drawn, known, verdicts
+from experiments.reproduction.keeping import FILE, opened
 from experiments.reproduction.pictures import Picture
+from experiments.reproduction.rows import SIGNS, bounds, shown
 from experiments.reproduction.sweeps import Sweep
-from experiments.reproduction.ways import OURS, PAPER, Way
+from experiments.reproduction.ways import OURS, PAPER
 
 DRAWS, QUICK_DRAWS = 100, 30
 FIGURES = "figures"
@@ -41,22 +46,28 @@ class Judged:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `reproduce` found, and the pictures that it drew."""
+    """What `reproduce` found, and the pictures that it drew.
+
+    comparisons: rows of the table beyond the papers, as JSON.
+    """
 
     judged: tuple[Judged, ...]
+    comparisons: tuple[dict[str, Any], ...]
     benchmark: Benchmark
     pictures: tuple[Picture, ...]
 
     def __repr__(self) -> str:
-        names = [each.claim.name for each in self.judged]
-        width = max(map(len, names))
-        lines = [
-            f"{'claim':<{width}}  {'paper':>7} {'its way':>8}  {'low to high':<18} {'ours':>8}"
-        ]
-        for each in self.judged:
-            lines += _rows(each, width)
-        held = sum(each.held for each in self.judged)
-        lines.append(f"{held} of {len(self.judged)} claims hold in the paper's own way")
+        lines: list[str] = []
+        if self.judged:
+            width = max(len(each.claim.name) for each in self.judged)
+            lines.append(
+                f"{'claim':<{width}}  {'paper':>7} {'its way':>8}  {'low to high':<18} {'ours':>8}"
+            )
+            for each in self.judged:
+                lines += _rows(each, width)
+            held = sum(each.held for each in self.judged)
+            lines.append(f"{held} of {len(self.judged)} claims hold in the paper's own way")
+        lines += map(_line, self.comparisons)
         lines += map(str, self.benchmark.settings["cut"])  # pyright: ignore[reportArgumentType]
         return "\n".join(lines)
 
@@ -66,47 +77,66 @@ def measure(
     *,
     quick: bool = False,
     seed: int = 0,
+    resume: bool = False,
     output: Path = Path(),
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Reproduction:
     """Measure the claims of the parts, each in the paper's way and in ours, and draw pictures.
 
     parts: names of files here, which hold `CLAIMS` and `draw`. A draw of all claims is one seed;
-    the same seeds serve both ways.
+    the same seeds serve both ways. What is found is kept beside the page as it comes; resume: go on
+    from there, else it is removed.
     """
-    modules = {part: importlib.import_module(f"experiments.reproduction.{part}") for part in parts}
+    modules = {
+        part: importlib.import_module(f"experiments.reproduction.{part}")
+        for part in parts
+        if part != rivals.NAME
+    }
+    claims = tuple(claim for module in modules.values() for claim in module.CLAIMS)
     count = QUICK_DRAWS if quick else DRAWS
-    tasks = [(tuple(parts), one) for one in range(seed, seed + count)]
-    draws: list[Mapping[tuple[str, str], tuple[float, ...]]] = []
-    with ProcessPoolExecutor(2) as pool:
-        for drawn in pool.map(_draw, tasks):
-            draws.append(drawn)
-            progress(len(draws), count)
+    form = "quick " if quick else ""
+    if not resume:
+        (output / FILE).unlink(missing_ok=True)
+    with opened(output) as kept:
+        draws = drawn(claims, range(seed, seed + count), kept, progress) if claims else []
+        swept = [
+            sweep
+            for part, module in modules.items()
+            for sweep in kept.once(f"{form}sweeps of {part}", lambda m=module: _swept(m, quick))
+        ]
+        names = rivals.names(quick) if rivals.NAME in parts else ()
+        beside = rivals.measured(names, kept, quick, seed, progress)
     judged: list[Judged] = []
     for module in modules.values():
         for claim in module.CLAIMS:
-            papers, ours = (_verdicts(claim, way, draws) for way in (PAPER, OURS))
+            papers, ours = (verdicts(claim, way, draws) for way in (PAPER, OURS))
             judged.append(Judged(claim, papers, ours))
     pictures = tuple(
         picture for module in modules.values() for picture in module.draw(output / FIGURES, seed)
     )
-    swept = tuple(sweep for module in modules.values() for sweep in module.sweeps(quick))
-    missing: dict[str, str] = {}
-    figures = _figures(judged, missing)
+    missing = dict(beside.not_measured)
+    figures = _figures(judged, missing) | beside.figures
     settings = {
         "parts": list(parts),
+        "quick": quick,
         "draws": count,
         **{name: told for module in modules.values() for name, told in module.settings().items()},
-        "cut": [CUT] if quick else [],
+        "cut": [*[CUT] * bool(quick and modules), *beside.cut],
         "not_measured": missing,
         "claims": {each.claim.name: each.claim.text for each in judged},
-        "sweeps": [_told(sweep) for sweep in swept],
+        "sweeps": swept,
+        "comparisons": list(beside.rows),
         "pictures": [
             {"part": each.part, "file": f"{FIGURES}/{each.file.name}", "caption": each.caption}
             for each in pictures
         ],
     }
-    return Reproduction(tuple(judged), Benchmark("reproduce", figures, settings, seed), pictures)
+    benchmark = Benchmark("reproduce", figures, settings, seed)
+    return Reproduction(tuple(judged), beside.rows, benchmark, pictures)
+
+
+def _swept(module: ModuleType, quick: bool) -> list[dict[str, object]]:
+    return [_told(sweep) for sweep in module.sweeps(quick)]
 
 
 def _told(sweep: Sweep) -> dict[str, object]:
@@ -116,34 +146,10 @@ def _told(sweep: Sweep) -> dict[str, object]:
         "columns": list(sweep.columns),
         "paper": list(sweep.paper),
         "rows": {
-            name: [[_known(x) for x in (each.ours, each.low, each.high)] for each in cells]
+            name: [[known(x) for x in (each.ours, each.low, each.high)] for each in cells]
             for name, cells in sweep.rows.items()
         },
     }
-
-
-def _known(value: float) -> float | None:
-    return None if math.isnan(value) else value
-
-
-def _draw(task: tuple[tuple[str, ...], int]) -> Mapping[tuple[str, str], tuple[float, ...]]:
-    """One draw of every claim in both ways; in one process, so that what they share is made once"""
-    parts, seed = task
-    claims = [
-        claim
-        for part in parts
-        for claim in importlib.import_module(f"experiments.reproduction.{part}").CLAIMS
-    ]
-    return {
-        (claim.name, way.name): claim.draw(seed, way) for claim in claims for way in (PAPER, OURS)
-    }
-
-
-def _verdicts(
-    claim: Claim, way: Way, draws: Sequence[Mapping[tuple[str, str], tuple[float, ...]]]
-) -> tuple[Verdict, ...]:
-    columns = zip(*(drawn[claim.name, way.name] for drawn in draws), strict=True)
-    return tuple(judge(*pair) for pair in zip(claim.values, columns, strict=True))
 
 
 def _figures(judged: Sequence[Judged], missing: dict[str, str]) -> dict[str, float | int | None]:
@@ -166,7 +172,7 @@ def _figures(judged: Sequence[Judged], missing: dict[str, str]) -> dict[str, flo
                 f"{key}.held_by_ours": ours.held if value.name else each.held_by_ours,
             }
             missing |= {name: NOTHING for name, it in told.items() if math.isnan(it)}
-            figures |= {name: _known(it) for name, it in told.items()}
+            figures |= {name: known(it) for name, it in told.items()}
     return figures
 
 
@@ -185,5 +191,13 @@ def _rows(each: Judged, width: int) -> list[str]:
     return lines
 
 
+def _line(row: Mapping[str, Any]) -> str:
+    """A comparison with a rival as text."""
+    return (
+        f"{row['benchmark']:<9} {shown(row['times']):>7} {bounds(row):>18}  "
+        f"{SIGNS[row['verdict']]:<8}  {row['ours']} | {row['rival']}"
+    )
+
+
 def _number(value: float) -> str:
-    return "—" if math.isnan(value) else f"{value:.3g}"
+    return shown(known(value))

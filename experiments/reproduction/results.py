@@ -5,7 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from experiments.reproduction.rows import COMMANDS, PAPERS, PART, cell, rows_of, shown, summary
+from experiments.reproduction.rows import (
+    BEYOND,
+    COMMANDS,
+    PAPERS,
+    PART,
+    READ,
+    RIVALS,
+    SIGNS,
+    bench_command,
+    beside,
+    bounds,
+    cell,
+    rows_of,
+    shown,
+    summary,
+)
 
 _HOW = """\
 *Paper* is what is printed, *its way* our figure in the paper's own way with its bounds, *ours* that
@@ -19,7 +34,7 @@ def results(told: Mapping[str, Any]) -> str:
     settings = told["settings"]
     machine = f"Python {told['machine']['python']}, {told['machine']['system']}"
     lines = ["# Both papers' claims beside ours", "", f"{summary(told)} {machine}.", ""]
-    lines += [*settings["cut"], _HOW]
+    lines += [*(f"- {cut}" for cut in settings["cut"]), "", _HOW]
     for paper, (short, full) in PAPERS.items():
         rows = rows_of(told, paper)
         if not rows:
@@ -39,7 +54,21 @@ def results(told: Mapping[str, Any]) -> str:
                 printed = ("printed", *map(shown, sweep["paper"]))
                 cells = [(name, *map(cell, row)) for name, row in sweep["rows"].items()]
                 lines += _table(("", *sweep["columns"]), [printed, *cells])
+    if settings["comparisons"]:
+        lines += ["", f"## {BEYOND}", "", READ, "", "```sh", COMMANDS[RIVALS], "```", ""]
+        lines += _rivals(told)
     return "\n".join(lines) + "\n"
+
+
+def _rivals(told: Mapping[str, Any]) -> list[str]:
+    """The table; the first row of a benchmark says what measures it."""
+    lines: list[tuple[str, ...]] = []
+    for benchmark, rows in beside(told).items():
+        lines.append((f"**{benchmark}** `{bench_command(told, benchmark)}`", *[""] * 4))
+        lines += [
+            (r["ours"], r["rival"], shown(r["times"]), bounds(r), SIGNS[r["verdict"]]) for r in rows
+        ]
+    return _table(("ours", "the rival", "times as good", "low to high", ""), lines)
 
 
 def _strong(sign: str) -> str:

@@ -13,8 +13,20 @@ PAPERS = {
             "Programming in Application to Robot Control. AGI 2016."),
 }  # fmt: skip
 """What a claim's name begins with, and the paper."""
-COMMANDS = {"zr": "anytime reproduce zr", "prp": "anytime reproduce nao"}
+RIVALS = "rivals"
+COMMANDS = {
+    "zr": "anytime reproduce zr",
+    "prp": "anytime reproduce nao",
+    RIVALS: "anytime reproduce rivals",
+}
 PART = {"zr": "zr", "nao": "prp"}
+BEYOND = "Beyond the papers: every benchmark beside its rivals"
+READ = (
+    "Times as good: the rival's time, work or error over ours, or our quality or value over "
+    "theirs; above 1 ours is better. ▲ better and ▼ worse: the whole 95 % interval is; "
+    "= equal: no difference is shown. Hindsight, an empty loop and “always” cannot be beaten."
+)
+SIGNS = {"better": "▲ better", "equal": "= equal", "worse": "▼ worse"}
 
 
 @dataclass(frozen=True)
@@ -59,9 +71,24 @@ def _row(name: str, found: Mapping[str, Any], text: str) -> Row:
     )
 
 
+def beside(told: Mapping[str, Any]) -> dict[str, list[Mapping[str, Any]]]:
+    """The comparisons with rivals by benchmark, in their order."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for row in told["settings"]["comparisons"]:
+        found.setdefault(row["benchmark"], []).append(row)
+    return found
+
+
+def bench_command(told: Mapping[str, Any], benchmark: str) -> str:
+    """What measures the figures of a benchmark again, all of them."""
+    return f"anytime bench {benchmark} --seed {told['seed']}"
+
+
 def shown(value: float | None) -> str:
-    """A figure in three digits."""
-    return "—" if value is None else f"{value:.3g}"
+    """A figure in three digits, more if it is above a thousand."""
+    if value is None:
+        return "—"
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"
 
 
 def cell(found: list[float | None]) -> str:
@@ -70,10 +97,25 @@ def cell(found: list[float | None]) -> str:
     return f"{shown(ours)} ({shown(low)} to {shown(high)})"
 
 
+def bounds(row: Mapping[str, Any]) -> str:
+    """The interval of a comparison."""
+    return f"{shown(row['low'])} to {shown(row['high'])}"
+
+
 def summary(told: Mapping[str, Any]) -> str:
-    """One sentence: how many claims hold, and in how many draws."""
+    """How many claims hold, in how many draws, and in how many comparisons we are better."""
     claims, settings = told["figures"]["claims"], told["settings"]
-    return (
-        f"{claims['held']} of {claims['total']} claims hold in the papers' own way; "
-        f"{settings['draws']} draws each, the first with seed {told['seed']}."
-    )
+    sentences: list[str] = []
+    if claims["total"]:
+        sentences.append(
+            f"{claims['held']} of {claims['total']} claims hold in the papers' own way; "
+            f"{settings['draws']} draws each, the first with seed {told['seed']}."
+        )
+    verdicts = [row["verdict"] for row in settings["comparisons"]]
+    if verdicts:
+        sentences.append(
+            f"Of {len(verdicts)} comparisons with rivals ours is better in "
+            f"{verdicts.count('better')}, worse in {verdicts.count('worse')}, and no difference is "
+            f"shown in {verdicts.count('equal')}."
+        )
+    return " ".join(sentences)

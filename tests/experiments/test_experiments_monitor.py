@@ -72,7 +72,8 @@ def test_chosen_rule_is_judged_on_runs_that_it_was_not_chosen_by(tmp_path):
 def test_times_of_a_decision_are_all_there():
     table = solve(kinds()["low", "fast", "hard"])
     figures = decision_times(table, np.random.default_rng(0), decisions=500)
-    assert set(figures) == {"decision.median_us", "decision.p99_us", "decision.vs_numpy"}
+    bounds = {"decision.vs_numpy_low", "decision.vs_numpy_high"}
+    assert set(figures) == {"decision.median_us", "decision.p99_us", "decision.vs_numpy", *bounds}
     assert figures["decision.vs_numpy"] > 1
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
+import sys
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +15,9 @@ import pytest
 from anytime.__main__ import main
 from experiments.reproduction import executions, nao, reproducing, searches
 from experiments.reproduction.claims import ENOUGH, Value, judge
+from experiments.reproduction.draws import drawn
 from experiments.reproduction.executions import AHEAD, execute, surprised
+from experiments.reproduction.keeping import FILE, opened
 from experiments.reproduction.ways import OURS, PAPER
 from monitor.robots.nao_noise import NOISELESS
 from planners.nao import STAND
@@ -126,13 +131,67 @@ def test_an_obstacle_puts_the_end_of_the_plan_at_its_place_or_where_it_is_touche
         assert ours - paper > 0.2  # a radius farther, and the fall
 
 
-def test_the_command_prints_one_object_and_draws_its_picture(capsys, tmp_path, monkeypatch):
-    few = ("prp.toy", "prp.obstacle_step", "prp.collision_on_crossing")
-    claims = tuple(claim for claim in nao.CLAIMS if claim.name in few)
-    monkeypatch.setattr(nao, "CLAIMS", claims)
+def few(*names):
+    return tuple(claim for claim in nao.CLAIMS if claim.name in names)
+
+
+_DRAWING = """
+from pathlib import Path
+from experiments.reproduction import draws, keeping, nao
+claims = tuple(claim for claim in nao.CLAIMS if claim.name == {name!r})
+with keeping.opened(Path({folder!r})) as kept:
+    draws.drawn(claims, range(10_000), kept)
+"""
+
+
+def test_one_that_was_killed_goes_on_and_finds_what_an_uninterrupted_one_finds(tmp_path):
+    claims = few("prp.collision_on_crossing")
+    name, file = claims[0].name, tmp_path / FILE
+    code = _DRAWING.format(name=name, folder=str(tmp_path))
+    with subprocess.Popen([sys.executable, "-c", code]) as begun:
+        while not file.exists() or file.read_bytes().count(b"\n") < 4:
+            assert begun.poll() is None
+            time.sleep(0.01)
+        begun.kill()
+    with file.open("a") as torn:
+        torn.write('{"name":"draw 99","fou')
+    with opened(tmp_path) as kept:
+        done = next(seed for seed in range(10_000) if kept.get(f"draw {seed}") is None)
+        assert done >= 3
+        found = drawn(claims, range(done + 2), kept)
+    whole = [
+        {name: {way.name: list(claims[0].draw(seed, way)) for way in (PAPER, OURS)}}
+        for seed in range(done + 2)
+    ]
+    assert found == whole
+
+
+def test_what_is_kept_is_not_found_again(tmp_path):
+    found = {"figure": np.float64(0.1), "count": np.int64(2), "both": (1.5, math.nan)}
+    told = {"figure": 0.1, "count": 2, "both": [1.5, None]}
+    with opened(tmp_path) as kept:
+        assert kept.once("bench", lambda: found) == told
+    with opened(tmp_path) as kept:
+        assert kept.once("bench", lambda: pytest.fail("found again")) == told
+
+
+def test_a_draw_without_one_of_the_claims_is_made_again(tmp_path):
+    claims = few("prp.collision_on_crossing")
+    with opened(tmp_path) as kept:
+        for seed, claim in enumerate((claims[0].name, "another")):
+            kept.keep(f"draw {seed}", {claim: {"paper": [0.5], "ours": [0.5]}})
+        first, second = drawn(claims, range(2), kept)
+    assert first[claims[0].name]["paper"] == [0.5]
+    assert second[claims[0].name]["paper"] == list(claims[0].draw(1, PAPER))
+
+
+def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        nao, "CLAIMS", few("prp.toy", "prp.obstacle_step", "prp.collision_on_crossing")
+    )
     monkeypatch.setattr(reproducing, "QUICK_DRAWS", 2)
-    code = main(["reproduce", "nao", "--quick", "--json", "-o", str(tmp_path)])
-    assert code == 0
+    words = ["reproduce", "nao", "--quick", "--json", "-o", str(tmp_path)]
+    assert main(words) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["figures"]["claims"] == {"total": 3, "held": 0}  # two draws hold nothing
     toy = told["figures"]["claim"]["prp"]["toy"]
@@ -143,8 +202,14 @@ def test_the_command_prints_one_object_and_draws_its_picture(capsys, tmp_path, m
     assert json.loads((tmp_path / "results.json").read_text()) == told
     assert "prp" in (tmp_path / "results.md").read_text().lower()
     assert "<svg" in (tmp_path / "reproduce.html").read_text()
+    kept = (tmp_path / FILE).read_bytes()
+    (tmp_path / FILE).write_bytes(kept[:-10])  # of the last line, which says that nothing was swept
+    monkeypatch.setattr(nao, "draw", lambda folder, seed: ())  # as before, and it takes seconds
+    assert main([*words, "--resume"]) == 0
+    assert json.loads(capsys.readouterr().out)["figures"] == told["figures"]
+    assert (tmp_path / FILE).read_bytes() == kept
 
 
 def test_what_is_not_there_cannot_be_reproduced(capsys):
     assert main(["reproduce", "moon"]) == 2
-    assert "choose zr, nao" in capsys.readouterr().err
+    assert "choose zr, nao, rivals" in capsys.readouterr().err

@@ -112,6 +112,8 @@ def told(folder) -> dict:
         },
         "settings": {
             "draws": 2,
+            "quick": True,
+            "comparisons": [],
             "cut": ["little"],
             "claims": {"zr.level3": "it is < 1"},
             "pictures": [

@@ -1,10 +1,7 @@
-"""What the tests of the monitor share: a made-up mission and a browser."""
+"""What the tests of the monitor share: a made-up mission."""
 
 from __future__ import annotations
 
-import importlib.util
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -93,20 +90,3 @@ def report() -> Report:
 @pytest.fixture(scope="session")
 def made_up() -> Any:
     return made_up_report
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Any]:
-    """A headless Chromium; skips where there is none."""
-    pytest.importorskip("websockets")
-    place = Path(__file__).with_name("chromium.py")
-    spec = importlib.util.spec_from_file_location("chromium_for_tests", place)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    if module.executable() is None:
-        pytest.skip("no Chromium is installed: the page cannot be looked at")
-    browser = module.Browser()
-    yield browser
-    browser.close()

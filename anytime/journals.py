@@ -1,0 +1,80 @@
+"""Append-only files of records: one a line, behind a line that says what they are of."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Generator
+from pathlib import Path
+from typing import BinaryIO, Generic, TypeVar
+
+import msgspec
+
+from anytime.errors import AnytimeError
+from anytime.files import Stored
+
+Line = TypeVar("Line", bound=Stored)
+
+
+class Journal(Generic[Line]):
+    """An open file of records. kept: those that it held when it was opened."""
+
+    def __init__(self, file: BinaryIO, kept: tuple[Line, ...]) -> None:
+        self._file = file
+        self.kept = kept
+
+    def append(self, line: Line) -> None:
+        """Add a record; it survives the death of this process."""
+        self._file.write(msgspec.json.encode(line) + b"\n")
+        self._file.flush()
+
+
+@contextlib.contextmanager
+def opened(path: Path, of: Stored, kind: type[Line]) -> Generator[Journal[Line]]:
+    """The journal at a path, made if there is none; a torn last line is dropped.
+
+    of: what makes its records comparable, which is its first line. Raises AnytimeError for a
+    journal of something else, one that another process writes to, and for what is no journal.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a+b") as file:
+        _lock(file, path)
+        file.seek(0)
+        content = file.read()
+        whole = content[: content.rfind(b"\n") + 1]
+        kept = _read(path, whole, of, kind)
+        file.truncate(len(whole))
+        if not whole:
+            file.write(msgspec.json.encode(of) + b"\n")
+            file.flush()
+        yield Journal(file, kept)
+
+
+def _lock(file: BinaryIO, path: Path) -> None:
+    try:
+        import fcntl
+    except ImportError:  # not every system has it
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        raise AnytimeError(f"{path}: another process writes to it; wait for it to end") from None
+
+
+def _read(path: Path, content: bytes, of: Stored, kind: type[Line]) -> tuple[Line, ...]:
+    kept: list[Line] = []
+    for number, line in enumerate(content.splitlines(), 1):
+        try:
+            if number > 1:
+                kept.append(msgspec.json.decode(line, type=kind))
+                continue
+            found = msgspec.json.decode(line, type=type(of))
+        except msgspec.MsgspecError as error:
+            raise AnytimeError(f"{path}:{number}: not one of our runs: {error}") from None
+        for name in of.__struct_fields__:
+            here, asked = getattr(found, name), getattr(of, name)
+            if here != asked:
+                raise AnytimeError(
+                    f"{path}: holds runs with {name} {here!r}, asked is {asked!r}; start anew, or "
+                    "ask for the same"
+                )
+    return tuple(kept)
