@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from anytime import WorkClock, measure
 from compiler import compile
-from compiler.calibrating import _blocks, _isotonic, _standing
+from compiler.calibrating import _blocks, _isotonic, _standing, calibrate_by_running
 from compiler.division import divide, expected_quality, moments_within
 from compiler.guarding import guards_of
 from compiler.replaying import replay_of
@@ -53,6 +55,29 @@ def test_what_is_surely_worse_with_more_time_is_dropped():
     assert _standing(values).tolist() == [True, True, False, False, True]
     noisy = np.stack([good, good[::-1] - 0.01], axis=1)
     assert _standing(noisy).all()
+
+
+@functools.cache
+def smooth():
+    return compiled_from(FAMILIES["smooth"](), cases(12, 1))
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=25)
+def test_of_divisions_that_were_run_those_are_kept_that_are_the_best_with_no_more_time(seed):
+    rng = np.random.default_rng(seed)
+    compiled = smooth()
+    jagged = np.clip(rng.normal(0.5, 0.2, 500), 0, 1)
+
+    def run(budgets):
+        at = np.searchsorted(compiled.frontier.budgets, budgets)
+        return np.clip(jagged[at] + rng.normal(0, 0.02, (40, len(budgets))), 0, 1)
+
+    kept, calibration = calibrate_by_running(compiled.tables, compiled.frontier, run)
+    rows = np.searchsorted(compiled.frontier.budgets, kept.budgets)
+    assert (np.diff(jagged[rows]) > -0.02).all()
+    assert np.abs(kept.promised - jagged[rows]).max() < 0.05
+    assert calibration.promise(0.0) == 0.0
 
 
 @pytest.mark.parametrize("name", ["hard", "gated tree"])
