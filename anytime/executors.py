@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import multiprocessing
 import os
 import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from multiprocessing.connection import wait
+from concurrent.futures import Executor, Future
 from typing import Any
 
 from anytime.errors import AnytimeError
@@ -65,6 +63,9 @@ def processes(count: int) -> Executor:
 
     They are started anew: a fork of a process with threads may deadlock.
     """
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
     methods = multiprocessing.get_all_start_methods()
     how = multiprocessing.get_context("forkserver" if "forkserver" in methods else "spawn")
     return ProcessPoolExecutor(count, mp_context=how, initializer=_end_with_parent)
@@ -72,6 +73,9 @@ def processes(count: int) -> Executor:
 
 def _end_with_parent() -> None:
     """End this worker when the campaign dies, however: a pool does not outlive a SIGKILL else."""
+    import multiprocessing
+    from multiprocessing.connection import wait
+
     parent = multiprocessing.parent_process()
     if parent is None:
         return
