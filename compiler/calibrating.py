@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from anytime.profiles import Profile
 from anytime.programs import Program
+from compiler.certificates import best_so_far
 from compiler.division import Frontier, divide, expected_quality, moments_within, value_of
 from compiler.intervals import mean_interval
 from compiler.objectives import Objective
@@ -101,12 +102,12 @@ def calibrate_by_running(
     """
     knots = _knots(frontier, RUN)
     values = run(frontier.budgets[knots].tolist())
-    kept = np.unique(_best_so_far(values))
+    kept = np.unique(best_so_far(values.mean(axis=0)))
     lived = np.zeros(values.shape)
     fold_of = np.arange(len(values)) % min(FOLDS, len(values))
     for fold in range(FOLDS):
         held = fold_of == fold
-        lived[held] = values[held][:, _best_so_far(values[~held])]
+        lived[held] = values[held][:, best_so_far(values[~held].mean(axis=0))]
     rows = knots[kept]
     worth = [
         expected_quality(tables, moments_within(tables, frontier.shares[row].tolist()))
@@ -120,13 +121,6 @@ def calibrate_by_running(
         promised=np.array(worth),
     )
     return calibration.applied(found), calibration
-
-
-def _best_so_far(values: Floats) -> NDArray[np.intp]:
-    """For each column of [P, K], the one with the best mean up to it."""
-    means = values.mean(axis=0)
-    better = means >= np.maximum.accumulate(means)
-    return np.maximum.accumulate(np.where(better, np.arange(len(means)), 0))
 
 
 def _calibrated(

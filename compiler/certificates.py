@@ -82,18 +82,18 @@ def bracketed(
     totals = shares.sum(axis=1)
     budgets = np.unique(np.concatenate([totals, necessary[np.isfinite(necessary)]]))
     by_total = np.argsort(totals)
-    best = by_total[_best_so_far(qualities(responses, shares)[by_total])]
+    best = by_total[best_so_far(qualities(responses, shares)[by_total])]
     divisions = shares[best[np.searchsorted(totals[by_total], budgets, side="right") - 1]]
     # What is left of the budget goes to the call that delivers the result.
     spent = divisions[:, -1] + (budgets - divisions.sum(axis=1)) * (1 + 1e-12)
     divisions[:, -1] = output.times[np.searchsorted(output.times, spent, side="right") - 1]
     delivered = qualities(responses, divisions)
-    best = _best_so_far(delivered)
+    best = best_so_far(delivered)
     ceiling = output.levels[np.searchsorted(necessary, budgets, side="right") - 1]
     return Certificate(budgets, delivered[best], ceiling, divisions[best])
 
 
-def _best_so_far(values: Floats) -> Levels:
+def best_so_far(values: Floats) -> Levels:
     """For each place, that of the greatest value up to it."""
     return np.maximum.accumulate(
         np.where(values >= np.maximum.accumulate(values), np.arange(len(values)), 0)
