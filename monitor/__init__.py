@@ -1,23 +1,5 @@
 """The monitor: spends a mission's time frame by frame, and says why."""
 
-from monitor.bodies import Robot
-from monitor.endings import Ending
-from monitor.missions import Energy, Mission, News, Value
-from monitor.monitoring import Monitor
-from monitor.reports import Frame, Report
-from monitor.states import Decision, Situation, State
+import lazy_loader as _lazy
 
-__all__ = [
-    "Decision",
-    "Ending",
-    "Energy",
-    "Frame",
-    "Mission",
-    "Monitor",
-    "News",
-    "Report",
-    "Robot",
-    "Situation",
-    "State",
-    "Value",
-]
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

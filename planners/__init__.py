@@ -1,27 +1,5 @@
 """How a robot finds its way: path finding, abstract plans, and avoidance of what is in the way."""
 
-from planners.atp import find_path, steps
-from planners.avoidance import Walk, blind_quality, blind_walk, walk
-from planners.grids import Grid
-from planners.multipath import MultiPath, Segment
-from planners.paper_atp import steps as paper_steps
-from planners.path_finding import Path, astar, length_of, route, textbook_astar, weighted_astar
+import lazy_loader as _lazy
 
-__all__ = [
-    "Grid",
-    "MultiPath",
-    "Path",
-    "Segment",
-    "Walk",
-    "astar",
-    "blind_quality",
-    "blind_walk",
-    "find_path",
-    "length_of",
-    "paper_steps",
-    "route",
-    "steps",
-    "textbook_astar",
-    "walk",
-    "weighted_astar",
-]
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -33,6 +33,7 @@ from experiments.benchmarks.figures import (
     ratio_interval,
     share_interval,
 )
+from experiments.benchmarks.footprint import footprint
 from experiments.domains import MACHINE, Domain, cross, domain, plan_across
 from planners.path_finding import Cell
 from sensing.vision import Sensor
@@ -107,6 +108,8 @@ def measure(
     figures |= _coverage(2000, seed)
     progress("promises on a machine that is slower")
     figures |= _calibrated(*((150, 150) if quick else (400, 1200)), seed)
+    progress("what importing costs")
+    figures |= footprint()
     return Benchmark("campaign", figures, settings, seed)
 
 

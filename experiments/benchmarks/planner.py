@@ -32,7 +32,7 @@ from experiments.benchmarks.planner_races import (
     timed,
 )
 from experiments.benchmarks.planner_sampling import sampled
-from planners import Grid, astar, blind_quality, paper_steps, textbook_astar
+from planners import Grid, astar, blind_quality, paper_atp, textbook_astar
 from sensing import instance, map_folder, read_map, read_scenarios
 
 _FAMILY, _SIZE = "r20", 128
@@ -265,7 +265,7 @@ def _paper(size: int, index: int, seed: int, repeats: int) -> tuple[float, float
     for _ in range(repeats):
         for seconds, search in zip(
             walls,
-            (lambda: astar(free, start, goal), lambda: list(paper_steps(domain, start, goal))),
+            (lambda: astar(free, start, goal), lambda: list(paper_atp.steps(domain, start, goal))),
             strict=True,
         ):
             begin = time.perf_counter()
@@ -275,7 +275,7 @@ def _paper(size: int, index: int, seed: int, repeats: int) -> tuple[float, float
     assert optimal is not None
     assert textbook is not None
     assert optimal.cost == textbook.cost
-    taken = list(paper_steps(domain, start, goal))
+    taken = list(paper_atp.steps(domain, start, goal))
     plans = [step.plan.plan for step in taken if step.plan is not None]
     first, last = (
         blind_quality(free, plan, start, goal, optimal.length) for plan in (plans[0], plans[-1])

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from planners import Grid, ara, paper_steps, steps
+from planners import Grid, ara, paper_atp, steps
 from planners.frontier import cells_of, path_to
 from planners.grids import endpoints
 from planners.improving import DONE, GAIN, MEETING, UPPER, begin, new_run, search
@@ -54,7 +54,7 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
 def paper(grid: Grid, start: Cell, goal: Cell) -> Iterator[Step]:
     """The paper's ATP."""
     blocked = (grid.cost == grid.wall).reshape(grid.shape).astype(np.float32)
-    yield from paper_steps(blocked, start, goal)
+    yield from paper_atp.steps(blocked, start, goal)
 
 
 Planner = Callable[[Grid, Cell, Cell], Iterator[Step]]
