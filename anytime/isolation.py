@@ -95,7 +95,7 @@ def perform(
         return False, Fault.of(error)
     finally:
         current.close()
-    return False, Fault("TimeoutError", "no worker process became ready in time")
+    return False, Fault("TimeoutError", workers.missing())
 
 
 def _job(

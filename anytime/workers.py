@@ -39,6 +39,7 @@ class Worker:
         finally:
             theirs.close()
         self.mailbox = Mailbox(ours)
+        self.ready = False
         self.idle = False
         self.ends = float("inf")  # of the job that it is at
         self.knows = set(known)
@@ -46,6 +47,7 @@ class Worker:
     def look(self) -> None:
         """Take what it has posted since it was cut; that came too late. Raises ClosedError."""
         while not self.idle and (letter := self.mailbox.receive(0.0)) is not None:
+            self.ready = True
             self.idle = letter.kind in (READY, DONE)
 
     def receive(self, until: float) -> Letter | None:
@@ -82,11 +84,11 @@ class Workers:
         self._dying: list[Worker] = []
         self._known: list[naming.Address] = []
         self._lock = threading.Lock()
+        self._stillborn = ""  # how the last one died that was never ready
 
     def take(self, module: naming.Address, until: float) -> Worker | None:
-        """A worker that is ready, until a time of `time.perf_counter`; None if none became so.
-
-        Whoever takes one gives it back or ends it.
+        """A worker that is ready, until a time of `time.perf_counter`; None if none became so,
+        see `missing`. Whoever takes one gives it back or ends it.
         """
         with self._lock:
             self._learn(module)
@@ -102,6 +104,11 @@ class Workers:
             if left <= 0:
                 return None
             time.sleep(min(left, _LOOK))
+
+    def missing(self) -> str:
+        """Why `take` may have found none."""
+        died = self._stillborn and f"; of the last that was never ready: {self._stillborn}"
+        return f"no worker process became ready in time{died}"
 
     def give(self, worker: Worker) -> None:
         """Give back a worker, idle or not."""
@@ -143,6 +150,8 @@ class Workers:
             except ClosedError:
                 hung = True
             if hung or worker.process.poll() is not None:
+                if not worker.ready:
+                    self._stillborn = worker.died()
                 self._kept.remove(worker)
                 self._bury(worker)
         idle = [worker for worker in self._kept if worker.idle]

@@ -78,7 +78,7 @@ def _no_process_is_left():
 def warm(module):
     """Wait for a worker, so that a short contract is the module's own."""
     worker = workers.take(naming.address(module.function), time.perf_counter() + LEFT)
-    assert worker is not None
+    assert worker is not None, workers.missing()
     workers.give(worker)
 
 
@@ -124,6 +124,18 @@ def test_on_a_work_clock_it_is_the_run_of_this_process_bit_for_bit(name, seconds
     assert repr(isolated) == repr(here)
     assert isolated == here
     assert clocks[0].now() == clocks[1].now()
+
+
+def test_where_no_worker_can_start_the_run_says_how_they_died(monkeypatch):
+    workers.close()
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    result = anytime.run(count, 4, seconds=1.0)
+    assert result.status is Status.NO_RESULT
+    assert result.fault.message == (
+        "no worker process became ready in time; "
+        "of the last that was never ready: the worker exited with 1"
+    )
+    workers.close()
 
 
 # What a module may do, and what comes of it
@@ -204,7 +216,7 @@ def test_threads_may_run_isolated_modules_at_the_same_time():
 def test_a_worker_that_is_killed_from_outside_is_replaced():
     warm(count)
     worker = workers.take(naming.address(count.function), time.perf_counter() + LEFT)
-    assert worker is not None
+    assert worker is not None, workers.missing()
     os.kill(worker.process.pid, signal.SIGKILL)
     workers.give(worker)
     assert anytime.run(count, 3, seconds=LEFT).value == 2
