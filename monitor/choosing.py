@@ -19,19 +19,20 @@ from monitor.states import Decision, State
 
 Floats = NDArray[np.float64]
 SPEEDS = 19
-DOUBT = 10.0  # missions that speak for a promise as it is
 
 
 @dataclass(frozen=True)
 class Verdict:
     """What held-out missions said of several policies.
 
-    name: of the best. nets: net value of each mission, by policy, on the same seeds. missed: mean
-    by which those of the best were worth more than it had promised; None if it foresees nothing.
+    name: of the best. nets: net value of each mission, by policy, on the same seeds. worth: mean
+    net value to expect of the best. missed: by how much that is more than it promises itself; None
+    if it foresees nothing.
     """
 
     name: str
     nets: Mapping[str, tuple[float, ...]]
+    worth: float
     missed: float | None
 
 
@@ -50,9 +51,8 @@ class Chosen:
         if verdict.missed is None:  # what it was worth before is what it promises
             if state.frame:
                 return decision
-            worth = float(np.mean(verdict.nets[verdict.name]))
-            curve = ((decision.contract, worth),)
-            return replace(decision, why=replace(decision.why, value=worth, curve=curve))
+            curve = ((decision.contract, verdict.worth),)
+            return replace(decision, why=replace(decision.why, value=verdict.worth, curve=curve))
         situation, why = state.situation, decision.why
         share = (situation.to_go + situation.in_hand) / state.route if state.route > 0 else 0.0
         more = verdict.missed * min(share, 1.0)
@@ -79,10 +79,22 @@ def judge_policies(
     }
     nets = {name: tuple(report.net for report in reports) for name, reports in lived.items()}
     name = max(policies, key=lambda each: float(np.mean(nets[each])))
-    missed = float(np.mean([report.net - report.promised for report in lived[name]]))
-    # A few missions say little about the promise; the fewer, the less they correct it.
-    trust = len(seeds) / (len(seeds) + DOUBT)
-    return Verdict(name, nets, trust * missed if np.isfinite(missed) else None)
+    worth = worth_of_choice(np.array([nets[each] for each in policies]))
+    missed = worth - float(np.mean([report.promised for report in lived[name]]))
+    return Verdict(name, nets, worth, missed if np.isfinite(missed) else None)
+
+
+def worth_of_choice(nets: Floats) -> float:
+    """Mean net value of the policy that is best on missions, on missions that did not choose it.
+
+    nets: [P, M] of policies on the same M missions. The best of several means is too good by the
+    luck that made it the best; so each mission is lived with what the others would have chosen.
+    """
+    missions = nets.shape[1]
+    if missions == 1:
+        return float(nets.max())
+    others = nets.sum(axis=1, keepdims=True) - nets
+    return float(nets[others.argmax(axis=0), np.arange(missions)].mean())
 
 
 def tuned_division(

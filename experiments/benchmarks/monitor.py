@@ -4,12 +4,14 @@ decision takes, and stopping rules on recorded traces."""
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.errors import AnytimeError
+from anytime.executors import processes
 from experiments import shipped
 from experiments.benchmarks.figures import Benchmark, Figures, median_interval, ratio_interval
 from experiments.benchmarks.monitor_gate import gate_figures
@@ -17,9 +19,9 @@ from experiments.benchmarks.monitor_kinds import SLOWER, kinds
 from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_news import news_figures
-from experiments.benchmarks.monitor_traces import trace_figures
+from experiments.benchmarks.monitor_traces import losses_on, trace_figures
 from experiments.benchmarks.monitor_visits import visit_figures
-from experiments.benchmarks.monitor_world import QUICK, STANDARD, world_figures
+from experiments.benchmarks.monitor_world import CELLS, QUICK, STANDARD, live_cell, world_figures
 from monitor.certainty import resolve
 from monitor.decision_process import DecisionProcess, Moment
 from monitor.decision_table import (
@@ -65,6 +67,13 @@ def measure(
     has one."""
     missing: dict[str, str] = {}
     settings: dict[str, object] = {"missions": MISSIONS, "not_measured": missing}
+    folder = traces or trace_folder()
+    paths = [] if folder is None else sorted(folder.glob("*.json"))
+    if folder is None:
+        for key in ("traces.loss", "traces.vs_fixed", "traces.worse_than_fixed"):
+            missing[key] = "no traces: --traces DIR or $ANYTIME_TRACES"
+    elif not paths:
+        raise AnytimeError(f"--traces {folder}: no .json file in it")
     figures: Figures = {}
     found: dict[str, list[float]] = {}
     deviations: list[float] = []
@@ -91,32 +100,51 @@ def measure(
     process = kinds()["high", "slow", "exponential"]
     table = solve(process)
     figures |= decision_times(table, np.random.default_rng([seed, 1]))
-    size = QUICK if quick else STANDARD
-    found_in_world, world_settings = world_figures(size, seed, progress)
-    figures |= found_in_world
-    settings |= world_settings
     progress("forks")
     briefing = brief(read_mission(shipped.mission_path()), shipped.profiles(), BRIEF)
     figures |= fork_figures(briefing, seed)
-    of_gate, gate_settings = gate_figures(seed, QUICK_TRIALS if quick else TRIALS, progress)
-    figures |= of_gate
-    settings |= gate_settings
     progress("a knob")
     figures |= knob_figures(seed)
-    progress("a deadline that becomes known on the way")
-    figures |= news_figures(seed, NEWS if not quick else QUICK_TRIALS)
-    progress("a round through several goals")
-    figures |= visit_figures(seed, VISITS if not quick else QUICK_TRIALS)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
-    folder = traces or trace_folder()
-    if folder is None:
-        for key in ("traces.loss", "traces.vs_fixed", "traces.worse_than_fixed"):
-            missing[key] = "no traces: --traces DIR or $ANYTIME_TRACES"
-    else:
-        measured, settings["rules_chosen"] = trace_figures(folder, seed, progress)
-        figures |= measured
+    of_parts, of_settings = _beside(quick, seed, paths, progress)
+    figures |= of_parts
+    settings |= of_settings
     return Benchmark("monitor", figures | dict.fromkeys(missing), settings, seed)
+
+
+def _beside(
+    quick: bool, seed: int, traces: Sequence[Path], progress: Callable[[str], None]
+) -> tuple[Figures, dict[str, object]]:
+    """What times nothing, in two processes: the world, the gate, news, visits, traces."""
+    size = QUICK if quick else STANDARD
+    figures: Figures = {}
+    settings: dict[str, object] = {}
+    with processes(2) as pool:
+        worlds = {key: pool.submit(live_cell, *key, size, seed) for key in CELLS}
+        gate = pool.submit(gate_figures, seed, QUICK_TRIALS if quick else TRIALS)
+        others = (
+            pool.submit(news_figures, seed, QUICK_TRIALS if quick else NEWS),
+            pool.submit(visit_figures, seed, QUICK_TRIALS if quick else VISITS),
+        )
+        sets = {path.stem: pool.submit(losses_on, path, seed) for path in traces}
+        cells = {}
+        for (kind, many), job in worlds.items():
+            cells[kind, many] = job.result()
+            progress(f"world: {kind} value, {'many pairs' if many else 'one pair'}")
+        found = [world_figures(cells, size), gate.result()]
+        progress("gate, news, visits")
+        figures |= others[0].result() | others[1].result()
+        if sets:
+            told, settings["rules_chosen"] = trace_figures(
+                {name: job.result() for name, job in sets.items()}
+            )
+            figures |= told
+            progress("traces")
+    for more, also in found:
+        figures |= more
+        settings |= also
+    return figures, settings
 
 
 def losses(

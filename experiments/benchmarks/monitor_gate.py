@@ -25,9 +25,7 @@ LIVED = 150  # missions with and without the slow-down, to hold the foreseen los
 Figures = dict[str, float | int | None]
 
 
-def gate_figures(
-    seed: int, trials: int, progress: Callable[[str], None]
-) -> tuple[Figures, dict[str, object]]:
+def gate_figures(seed: int, trials: int) -> tuple[Figures, dict[str, object]]:
     """Figures under `gate.`, and the settings.
 
     found: share of trials in which `see`, a fifth slower, is called a loss; `found_planner` the
@@ -47,10 +45,8 @@ def gate_figures(
     def again(**slower: float) -> ProfileLibrary:
         return _measured_again(library, slower, rng)
 
-    progress("gate: planted slow-downs")
     found = [alarm(again(), again(see=SLOWER)) for _ in range(trials)]
     planner = [alarm(again(), again(find_path=SLOWER)) for _ in range(trials // 2)]
-    progress("gate: no change")
     same = [alarm(again(), again()) for _ in range(trials - trials // 2)]
     others = (measured(grid, seed + 1 + each, problems=PROBLEMS) for each in range(trials // 2))
     other = [alarm(again(), _measured_again(fresh, {}, rng)) for fresh in others]
@@ -60,7 +56,6 @@ def gate_figures(
         "gate.false_alarms": float(np.mean([*same, *other])),
         "gate.false_alarms_other_problems": float(np.mean(other)),
     }
-    progress("gate: the slow-down lived")
     slow = _slowed(library, {"see": SLOWER})
     figures["gate.foreseen"] = gate(known, shifts_of_libraries(navigate, library, slow)).loss
     figures |= _lived_loss(grid, briefing, library)

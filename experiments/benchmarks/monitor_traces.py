@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -113,32 +113,29 @@ def cross_validate(
     return TraceLosses(losses, tuple(chosen))
 
 
-def trace_figures(
-    folder: Path, seed: int, progress: Callable[[str], None]
-) -> tuple[Figures, dict[str, object]]:
+def losses_on(path: Path, seed: int) -> TraceLosses:
+    """`cross_validate` on the traces of a file."""
+    return cross_validate(read_traces(path), seed)
+
+
+def trace_figures(sets: Mapping[str, TraceLosses]) -> tuple[Figures, dict[str, object]]:
     """Figures under `traces.`, and the settings: which rules were chosen in how many folds.
 
-    Raises AnytimeError for a folder without traces.
+    sets: by name, at least one.
     """
-    paths = sorted(folder.glob("*.json"))
-    if not paths:
-        raise AnytimeError(f"--traces {folder}: no .json file in it")
     figures: Figures = {}
     settings: dict[str, object] = {}
-    means: dict[str, list[float]] = {"chosen": [], "fixed": []}
-    worse = 0
-    for path in paths:
-        progress(f"traces: {path.stem}")
-        found = cross_validate(read_traces(path), seed)
-        for name, losses in found.losses.items():
-            figures[f"traces.{path.stem.replace('.', '_')}.{name}"] = float(losses.mean())
-        for name, column in means.items():
-            column.append(float(found.losses[name].mean()))
-        worse += found.worse_than_fixed
-        settings[path.stem] = {name: found.chosen.count(name) for name in set(found.chosen)}
-    tsp = [loss for path, loss in zip(paths, means["chosen"], strict=True) if "tsp" in path.stem]
-    figures["traces.loss"] = float(np.mean(means["chosen"]))
+    for name, found in sets.items():
+        for rule, losses in found.losses.items():
+            figures[f"traces.{name.replace('.', '_')}.{rule}"] = float(losses.mean())
+        settings[name] = {rule: found.chosen.count(rule) for rule in set(found.chosen)}
+    chosen, fixed = (
+        {name: float(found.losses[rule].mean()) for name, found in sets.items()}
+        for rule in ("chosen", "fixed")
+    )
+    tsp = [loss for name, loss in chosen.items() if "tsp" in name]
+    figures["traces.loss"] = float(np.mean([*chosen.values()]))
     figures["traces.loss_tsp"] = float(np.mean(tsp)) if tsp else None
-    figures |= ratio_interval("traces.vs_fixed", means["chosen"], means["fixed"])
-    figures["traces.worse_than_fixed"] = worse
+    figures |= ratio_interval("traces.vs_fixed", [*chosen.values()], [*fixed.values()])
+    figures["traces.worse_than_fixed"] = sum(found.worse_than_fixed for found in sets.values())
     return figures, settings

@@ -3,21 +3,20 @@ as measured."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from anytime.executors import processes
 from experiments import shipped
 from experiments.comparing import bootstrap, share_of_first
 from experiments.hindsight import hindsight
 from experiments.racing import race
 from monitor.choosing import Chosen, tuned_division
 from monitor.missions import Value
-from monitor.robots.briefing import Briefing, Effort, brief
+from monitor.robots.briefing import Briefing, brief
 from monitor.robots.grid_missions import GridMission, read_mission
 
 Floats = NDArray[np.float64]
@@ -32,28 +31,31 @@ SHORTEST = 120.0  # cells between the start and goal of a pair
 
 @dataclass(frozen=True)
 class Size:
-    """missions: of each policy in a cell. pairs: of start and goal in the cell of many. raced:
-    whether the fixed division is raced, besides being tuned on the missions of calibration.
-    hindsight: seeds for which it is searched, each with so many candidates."""
+    """missions: of each policy in a cell. further: of the product's policy alone, to hold its
+    promise against. pairs: of start and goal in the cell of many. raced: whether the fixed division
+    is raced, besides being tuned on the missions of calibration. hindsight: seeds for which it is
+    searched, each with so many candidates."""
 
     missions: int
+    further: int
     pairs: int
     raced: bool
     hindsight: int
     candidates: int = 300
 
 
-STANDARD = Size(missions=200, pairs=5, raced=True, hindsight=10)
-QUICK = Size(missions=30, pairs=1, raced=False, hindsight=0)
-PAIR_EFFORT = Effort(levels=6, rhythm_seeds=6, seeds=8, choice_seeds=10)
+STANDARD = Size(missions=200, further=300, pairs=5, raced=True, hindsight=5)
+QUICK = Size(missions=30, further=0, pairs=1, raced=False, hindsight=0)
+CELLS = [(value.kind, many) for many in (False, True) for value in VALUES]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Net values on the same seeds by policy, what was promised for each mission, and hindsight's
-    net values for the first of them."""
+    """Net values on the same seeds by policy; of the product's on these and on further ones, and
+    what it promised for each; hindsight's net values for the first of them."""
 
     nets: dict[str, Floats]
+    achieved: Floats
     promised: Floats
     hindsight: Floats
     chosen: tuple[str, ...]
@@ -65,22 +67,22 @@ def live_cell(kind: str, many: bool, size: Size, seed: int) -> Cell:
     grid = read_mission(shipped.mission_path())
     grid = replace(grid, mission=replace(grid.mission, value=value))
     grids = _pairs(grid, size.pairs, seed) if many else [grid]
-    each = -(-size.missions // len(grids))
-    parts = [
-        _live(pair, range(seed * size.missions, seed * size.missions + each), many, size)
-        for pair in grids
-    ]
+    parts = [_live(pair, seed, len(grids), size) for pair in grids]
     return Cell(
         {name: np.concatenate([part.nets[name] for part in parts]) for name in POLICIES},
+        np.concatenate([part.achieved for part in parts]),
         np.concatenate([part.promised for part in parts]),
         np.concatenate([part.hindsight for part in parts]),
         tuple(name for part in parts for name in part.chosen),
     )
 
 
-def _live(grid: GridMission, seeds: range, many: bool, size: Size) -> Cell:
-    briefing = brief(grid, shipped.profiles(), PAIR_EFFORT if many else None)
-    briefing = _with_fixed(briefing, raced=size.raced and not many)
+def _live(grid: GridMission, seed: int, pairs: int, size: Size) -> Cell:
+    """Live the share of one of so many pairs."""
+    each, further = -(-size.missions // pairs), -(-size.further // pairs)
+    first = seed * (each + further)
+    seeds = range(first, first + each)
+    briefing = _with_fixed(brief(grid, shipped.profiles()), raced=size.raced and pairs == 1)
     optimal = briefing.monitor("optimal")
     assert isinstance(optimal.policy, Chosen)
     monitors = {"optimal": optimal, "paper": briefing.monitor("paper")}
@@ -90,11 +92,18 @@ def _live(grid: GridMission, seeds: range, many: bool, size: Size) -> Cell:
     reports = {name: [briefing.live(monitors[name], seed) for seed in seeds] for name in POLICIES}
     known = [
         hindsight(briefing, seed, [lived[index] for lived in reports.values()], size.candidates)
-        for index, seed in enumerate(seeds[: 0 if many else size.hindsight])
+        for index, seed in enumerate(seeds[: size.hindsight if pairs == 1 else 0])
     ]
     nets = {name: np.array([report.net for report in lived]) for name, lived in reports.items()}
-    promised = np.array([report.promised for report in reports["optimal"]])
-    return Cell(nets, promised, np.array(known), (optimal.policy.verdict.name,))
+    more = [briefing.live(optimal, seed) for seed in range(first + each, first + each + further)]
+    lived = [*reports["optimal"], *more]
+    return Cell(
+        nets,
+        np.array([report.net for report in lived]),
+        np.array([report.promised for report in lived]),
+        np.array(known),
+        (optimal.policy.verdict.name,),
+    )
 
 
 def _with_fixed(briefing: Briefing, raced: bool) -> Briefing:
@@ -133,9 +142,9 @@ def _pairs(grid: GridMission, count: int, seed: int) -> list[GridMission]:
 
 
 def world_figures(
-    size: Size, seed: int, progress: Callable[[str], None]
+    cells: Mapping[tuple[str, bool], Cell], size: Size
 ) -> tuple[dict[str, float | int | None], dict[str, object]]:
-    """Figures under `world.`, `promise_error`, and the settings.
+    """Figures under `world.`, `promise_error`, and the settings; cells: of `CELLS`.
 
     A gap is what a policy's mean lacks to that of the best policy of the cell, as a share of it;
     `world.gap.POLICY` is the greatest over the cells. A margin is over the fixed division, in the
@@ -144,18 +153,18 @@ def world_figures(
     figures: dict[str, float | int | None] = {}
     gaps: dict[str, list[float]] = {name: [] for name in POLICIES}
     errors: list[float] = []
-    settings: dict[str, object] = {"missions_a_cell": size.missions, "pairs": size.pairs}
-    keys = [(value.kind, many) for many in (False, True) for value in VALUES]
-    with processes(2) as pool:
-        jobs = [pool.submit(live_cell, kind, many, size, seed) for kind, many in keys]
-        for (kind, many), job in zip(keys, jobs, strict=True):
-            cell, name = job.result(), f"{kind}_{'many' if many else 'one'}"
-            progress(f"world: {name}")
-            figures |= _cell_figures(cell, f"world.{name}", gaps, errors)
-            settings[f"{name}.chosen"] = list(cell.chosen)
-            margin = bootstrap([cell.nets["optimal"], cell.nets["fixed"]], share_of_first)
-            where = f"world.{name}.margin_fixed" if many else f"world.margin_fixed.{kind}"
-            figures |= margin.under(where)
+    settings: dict[str, object] = {
+        "missions_a_cell": size.missions,
+        "missions_of_a_promise": size.missions + size.further,
+        "pairs": size.pairs,
+    }
+    for (kind, many), cell in cells.items():
+        name = f"{kind}_{'many' if many else 'one'}"
+        figures |= _cell_figures(cell, f"world.{name}", gaps, errors)
+        settings[f"{name}.chosen"] = list(cell.chosen)
+        margin = bootstrap([cell.nets["optimal"], cell.nets["fixed"]], share_of_first)
+        where = f"world.{name}.margin_fixed" if many else f"world.margin_fixed.{kind}"
+        figures |= margin.under(where)
     for name, found in gaps.items():
         figures[f"world.gap.{name}"] = max(found)
     figures["promise_error"] = max(errors)
@@ -175,9 +184,12 @@ def _cell_figures(
         figures |= lost.under(f"{key}.gap.{name}")
         gaps[name].append(lost.value)
     promised = float(cell.promised.mean())
-    errors.append(abs(means["optimal"] - promised) / promised)
+    errors.append(abs(float(cell.achieved.mean()) - promised) / promised)
     figures[f"{key}.promised"] = promised
     figures[f"{key}.promise_error"] = errors[-1]
+    # What the mean of so many missions is off in any case, nineteen times of twenty.
+    chance = 1.96 * float(cell.achieved.std()) / np.sqrt(len(cell.achieved))
+    figures[f"{key}.promise_error_by_chance"] = float(chance) / promised
     if len(cell.hindsight):
         figures[f"{key}.value.hindsight"] = float(cell.hindsight.mean())
         known = cell.nets["optimal"][: len(cell.hindsight)]
