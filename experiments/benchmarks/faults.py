@@ -83,7 +83,7 @@ def measure(
     figures |= _halt(links, seed, settings)
     progress(f"qi: {clients} connections that speak nonsense, and as many calls")
     figures |= _qi(clients, seed, settings)
-    long = HOUR if full else 20.0 if quick else 120.0
+    long = HOUR if full else 20.0 if quick else 300.0
     progress(f"soak: {long:.0f} s of missions in a process of their own")
     figures |= _soak(long, seed, settings)
     progress("mutation: programs with one thing changed, for --full alone")
