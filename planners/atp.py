@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
-from planners import blocks, improving, tracing
+from planners import blocks, improving, region_search, tracing
 from planners.frontier import cells_of, least_way
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
@@ -202,10 +202,12 @@ class _Query:
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         try:
-            work = blocks.begin_regions(*soft, self.start, self.goal, percent, grid.regions, run)
+            work = region_search.begin_regions(
+                *soft, self.start, self.goal, percent, grid.regions, run
+            )
             found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
-                found, taken = blocks.search_regions(
+                found, taken = region_search.search_regions(
                     *soft, self.goal, self.diagonals, percent, grid.regions, run,
                     GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
@@ -254,12 +256,12 @@ class _Query:
         return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
 
 
-_region_runs: dict[tuple[int, int], list[blocks.RegionRun]] = {}
+_region_runs: dict[tuple[int, int], list[region_search.RegionRun]] = {}
 
 
-def _borrow_regions(shape: tuple[int, int]) -> blocks.RegionRun:
+def _borrow_regions(shape: tuple[int, int]) -> region_search.RegionRun:
     kept = _region_runs.setdefault(shape, [])
-    return kept.pop() if kept else blocks.new_region_run(*shape)
+    return kept.pop() if kept else region_search.new_region_run(*shape)
 
 
 def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:

@@ -9,12 +9,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from planners.blocks import SIDE, Regions, features, forget, new_regions
+from planners.blocks import SIDE, Regions, forget, new_regions
+from planners.map_features import features
 from planners.path_finding import Cell, flat, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "20bd87ac3dd7"
+CALLED = "9f8d4e5660ac"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from planners.blocks import MOST, SIDE, UNKNOWN, features, know, new_regions
+from planners.blocks import MOST, SIDE, UNKNOWN, know, new_regions
+from planners.map_features import features
 from planners.search import UNLIMITED
 from sensing import clustered, maze, rooms, uniform
 

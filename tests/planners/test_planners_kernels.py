@@ -9,7 +9,7 @@ import pytest
 import planners
 
 FOLDER = Path(planners.__file__).parent
-CALLEES = {"search", "frontier", "windows", "blocks", "refining"}
+CALLEES = {"search", "frontier", "windows", "blocks", "region_search", "refining"}
 CALLEES |= {"query.header", "query.choosing", "query.varying"}
 IMPORT = re.compile(r"^from planners\.([a-z_.]+) import", re.MULTILINE)
 STATED = re.compile(r'^CALLED = "(\w*)"', re.MULTILINE)
@@ -35,7 +35,9 @@ CALLERS = [name for name in with_kernels() if called(name)]
 
 
 def test_there_are_such_files():
-    assert {"ara", "blocks", "improving", "tracing", "windows", "query.genetics"} <= set(CALLERS)
+    assert {"ara", "improving", "region_search", "tracing", "windows", "query.genetics"} <= set(
+        CALLERS
+    )
 
 
 @pytest.mark.parametrize("name", CALLERS)

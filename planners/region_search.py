@@ -1,0 +1,280 @@
+"""Weighted A* over a map's regions, which are parted while it goes on.
+
+Its labels and buckets are kept in a workspace: labels of earlier searches count as none, so that
+nothing has to be cleared.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from planners.blocks import ALL, EXPANDED, MOST, SIDE, TOUCHED, know, region_of
+from planners.frontier import detour, flood, least_way, next_base
+from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
+
+CALLED = "b39e18bc19ba"
+
+FOUND = 0
+BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
+OPENED, LAST_REGION, SHIFT, CURRENT, LOW, HIGH, FRESH, UNUSED = range(8)
+"""State of a search over regions: entries in all buckets; the goal's region; width of a bucket, as
+a shift; the bucket at work, the lowest and the highest used; the first entry never used, the first
+given back."""
+
+
+class RegionRun(NamedTuple):
+    """Arrays of a search over regions: buckets, their entries and labels as in `improving`.
+
+    Of each region, pin: the cell where it is entered. parent: the region from which. door: the
+    cells that join the two, as bits along their border, and the side of the parent in the next
+    byte. bend: the cell at which the way to the pin bends last.
+    """
+
+    clock: NDArray[np.int64]
+    label: NDArray[np.int64]
+    bucket: NDArray[np.int32]
+    entry: NDArray[np.int32]
+    behind: NDArray[np.int32]
+    pin: NDArray[np.int32]
+    parent: NDArray[np.int32]
+    door: NDArray[np.int32]
+    bend: NDArray[np.int32]
+    cheapest: NDArray[np.int64]
+    state: NDArray[np.int64]
+
+
+def new_region_run(rows: int, columns: int) -> RegionRun:
+    """Arrays for a map of that size."""
+    regions = -(-rows // SIDE) * -(-columns // SIDE) * MOST
+    return RegionRun(
+        clock=np.zeros(1, np.int64),
+        label=np.zeros(regions, np.int64),
+        bucket=np.full(BUCKETS, NOTHING, np.int32),
+        # Two blocks share at most 8 cells of a border, so this many joins at most.
+        entry=np.zeros(regions + 1, np.int32),
+        behind=np.zeros(regions + 1, np.int32),
+        pin=np.zeros(regions, np.int32),
+        parent=np.zeros(regions, np.int32),
+        door=np.zeros(regions, np.int32),
+        bend=np.zeros(regions, np.int32),
+        cheapest=np.zeros(regions, np.int64),
+        state=np.zeros(8, np.int64),
+    )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, run):
+    """Begin a search from start to goal; return the work, in 1/256 expansions."""
+    rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
+    state, work = run.state, 0
+    for node in (start, goal):
+        block = node // columns // SIDE * across + node % columns // SIDE
+        work += know(cost, wall, dearest, columns, block, regions)
+    base = next_base(run)
+    for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
+        run.bucket[place & (BUCKETS - 1)] = NOTHING
+    first, last = region_of(columns, start, regions), region_of(columns, goal, regions)
+    state[OPENED], state[LAST_REGION], state[LOW], state[HIGH] = 0, last, 0, -1
+    if first < 0 or last < 0:
+        return work
+    # All that is open at once must fit into the ring of buckets: f falls on the way to the goal by
+    # what the weight adds, and rises with one step by at most two blocks each way and back.
+    spread = (percent - 100) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
+    state[SHIFT] = FINE
+    while spread >> state[SHIFT] >= BUCKETS:
+        state[SHIFT] += 1
+    run.label[first] = base
+    run.pin[first] = start
+    run.parent[first] = -1
+    run.door[first] = 0
+    run.bend[first] = start
+    h = least_way(start // columns - goal // columns, start % columns - goal % columns, True)
+    state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
+    state[CURRENT] = state[LOW] = state[HIGH] = (h * percent // 100) >> state[SHIFT]
+    run.entry[0], run.behind[0] = first, NOTHING
+    run.bucket[state[CURRENT] & (BUCKETS - 1)] = 0
+    return work
+
+
+def _nearest() -> NDArray[np.uint8]:
+    """By cells of a border (bits) and one of its eight places: the place of the nearest cell."""
+    table = np.zeros((1 << SIDE, SIDE), np.uint8)
+    for cells in range(1, 1 << SIDE):
+        places = [place for place in range(SIDE) if cells >> place & 1]
+        for wanted in range(SIDE):
+            table[cells, wanted] = min(places, key=lambda place: abs(place - wanted))
+    return table
+
+
+NEAREST = _nearest()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def crossing(ahead, along, goal_ahead, goal_along, line):
+    """Where the straight way from a place to a goal crosses a line `ahead`; if it does not, where a
+    diagonal towards the goal would."""
+    to_line, to_goal, aside = line - ahead, goal_ahead - ahead, goal_along - along
+    if to_line * to_goal > 0 and abs(to_line) <= abs(to_goal):
+        return along + int(np.floor(aside * to_line / to_goal + 0.5))
+    return along + min(max(aside, -abs(to_line)), abs(to_line))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _in_sight(cells, first, line, ahead, along, to_ahead, to_along):
+    """Whether the straight way between two places crosses a line `ahead` in one of the cells, bits
+    from `first` on."""
+    if (line - ahead) * (to_ahead - line) < 0 or to_ahead == ahead:
+        return False
+    place = crossing(ahead, along, to_ahead, to_along, line) - first
+    return 0 <= place < SIDE and (cells >> place) & 1 != 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regions, run, budget):
+    """Go on with the search; return (FOUND or NO_PATH or OUT_OF_BUDGET, work in 1/256 expansions).
+
+    Weighted A*. A region is entered by one cell, its pin: of the cells that join it to the region
+    before, the one nearest to the straight way to the goal from where the way bends last. It bends
+    anew where what is straight from there does not lead through the door before.
+    """
+    across = (columns + SIDE - 1) // SIDE
+    tall, count = regions.count.size // across, regions.count.size
+    label, bucket, entry, behind, edge = run.label, run.bucket, run.entry, run.behind, regions.edge
+    pins, bends, doors, parents = run.pin, run.bend, run.door, run.parent
+    cheapest = run.cheapest
+    state, base, work, found = run.state, run.clock[0], 0, NO_PATH
+    shift, last, current, opened = state[SHIFT], state[LAST_REGION], state[CURRENT], state[OPENED]
+    low, high, fresh, unused = state[LOW], state[HIGH], state[FRESH], state[UNUSED]
+    goal_row, goal_column = goal // columns, goal % columns
+    per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
+    waves = np.empty(SIDE * SIDE + 1, np.uint64)
+    while opened > 0:
+        if work >= budget:
+            found = OUT_OF_BUDGET
+            break
+        place = np.int64(bucket[current & (BUCKETS - 1)])
+        if place < 0:
+            current += 1
+            continue
+        bucket[current & (BUCKETS - 1)] = behind[place]
+        behind[place], unused = unused, place
+        opened -= 1
+        here = np.int64(entry[place])
+        if label[here] & 1:  # closed
+            continue
+        work += EXPANDED
+        pin_g = base - label[here]
+        label[here] -= 1
+        if here == last:
+            found = FOUND
+            break
+        # Divisions of integers would take most of the time.
+        block = here - int((here + 0.5) * per_block) * count
+        block_row = int((block + 0.5) * per_across)
+        block_column = block - block_row * across
+        top, left = block_row * SIDE, block_column * SIDE
+        pin, bend = np.int64(pins[here]), np.int64(bends[here])
+        pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
+        pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
+        door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
+        bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
+        inside, reached, mask = np.int64(0), np.int64(0), regions.mask[here]
+        if mask != ALL:  # what stands in the block may be in the way
+            inside = (pin_row - top) * SIDE + pin_column - left
+            reached = flood(mask, inside, diagonals, waves)
+            work += reached * TOUCHED
+        for side in range(4):
+            mine = (np.int64(edge[here]) >> (SIDE * side)) & 0xFF
+            if mine == 0:
+                continue
+            if side == 0:
+                there, line, outside = block - across, top - 1, top == 0
+            elif side == 1:
+                there, line = block + across, top + SIDE
+                outside = block_row + 1 == tall
+            elif side == 2:
+                there, line, outside = block - 1, left - 1, left == 0
+            else:
+                there, line = block + 1, left + SIDE
+                outside = block_column + 1 == across
+            if outside:
+                continue
+            first = left if side < 2 else top
+            work += know(cost, wall, dearest, columns, there, regions)
+            for number in range(np.int64(regions.count[there])):
+                region = number * count + there
+                join = mine & (np.int64(edge[region]) >> (SIDE * (side ^ 1)))
+                if join == 0:
+                    continue
+                old = label[region]
+                known = old > base - SPAN
+                if known and old & 1:
+                    continue
+                from_row, from_column, from_g, from_cell = bend_row, bend_column, bend_g, bend
+                row, column = line, line
+                for turn in range(2):
+                    if side < 2:
+                        place = crossing(from_row, from_column, goal_row, goal_column, line)
+                    else:
+                        place = crossing(from_column, from_row, goal_column, goal_row, line)
+                    place = first + NEAREST[join, min(max(place - first, 0), SIDE - 1)]
+                    if side < 2:
+                        column = place
+                    else:
+                        row = place
+                    if turn == 1 or bend == pin:
+                        break
+                    if upright:
+                        seen = _in_sight(door, left, pin_row, bend_row, bend_column, row, column)
+                    else:
+                        seen = _in_sight(door, top, pin_column, bend_column, bend_row, column, row)
+                    if seen:
+                        break
+                    from_row, from_column, from_g, from_cell = pin_row, pin_column, pin_g, pin
+                g = from_g + least_way(row - from_row, column - from_column, diagonals)
+                h = least_way(row - goal_row, column - goal_column, diagonals)
+                exit = np.int64(0)
+                if reached > 0:
+                    start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
+                    exit = start + (place - first) * stride
+                if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
+                    # The way goes round something within the block, and may bend anywhere.
+                    least, best = SPAN, np.int64(0)
+                    for place in range(SIDE):
+                        if (join >> place) & 1 == 0:
+                            continue
+                        more = detour(waves, reached, inside, start + place * stride, diagonals)
+                        row = line if side < 2 else first + place
+                        column = first + place if side < 2 else line
+                        g = pin_g + STRAIGHT * more
+                        g += least_way(row - pin_row, column - pin_column, diagonals)
+                        h = least_way(row - goal_row, column - goal_column, diagonals)
+                        if g + h < least:
+                            least, best = g + h, first + place
+                    row = line if side < 2 else best
+                    column = best if side < 2 else line
+                    h = least_way(row - goal_row, column - goal_column, diagonals)
+                    g, from_cell = least - h, row * columns + column
+                f = g + h * percent // 100
+                if known and f >= cheapest[region]:
+                    continue
+                label[region], cheapest[region] = base - g, f
+                pins[region] = row * columns + column
+                bends[region] = from_cell
+                doors[region] = join | (side ^ 1) << SIDE
+                parents[region] = here
+                if unused >= 0:
+                    place, unused = unused, np.int64(behind[unused])
+                else:
+                    place = fresh
+                    fresh += 1
+                number = f >> shift
+                entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
+                bucket[number & (BUCKETS - 1)] = place
+                opened += 1
+                current, low, high = min(current, number), min(low, number), max(high, number)
+    state[CURRENT], state[OPENED] = current, opened
+    state[LOW], state[HIGH], state[FRESH], state[UNUSED] = low, high, fresh, unused
+    return found, work
