@@ -5,8 +5,8 @@ from .errors import ModelError, NativeError
 from .models import Model, model
 from .modules import module
 from .operators import SWITCHES, Operators
-from .plain import Rng
 from .querying import Query
+from .sources import Rng
 from .worlds import World, plain
 
 __all__ = [

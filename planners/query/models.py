@@ -12,7 +12,7 @@ import numpy as np
 from anytime.errors import AnytimeError
 from planners.query import native, reading, worlds
 from planners.query.choices import Address
-from planners.query.plain import Replay
+from planners.query.sources import Replay
 
 
 class Model:

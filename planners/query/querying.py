@@ -20,8 +20,8 @@ from planners.query.errors import NativeError
 from planners.query.memory import Memory
 from planners.query.models import Model
 from planners.query.operators import Operators
-from planners.query.plain import Rng, Sources
 from planners.query.reading import Text
+from planners.query.sources import Rng, Sources
 from planners.query.worlds import World
 
 TURN = 5e-4

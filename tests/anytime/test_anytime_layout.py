@@ -74,6 +74,13 @@ def test_the_public_names_are_those_of_the_contents(name):
     assert all((getattr(package, public).__doc__ or "").strip() for public in listed)
 
 
+@pytest.mark.parametrize("name", CONTENTS)
+def test_no_public_name_is_that_of_a_file_beside_it(name):
+    """Importing the file would put it in the name's place."""
+    beside = {path.stem for path in (ROOT / name.replace(".", "/")).iterdir()}
+    assert beside.isdisjoint(importlib.import_module(name).__all__)
+
+
 def is_all(part: ast.stmt) -> bool:
     return isinstance(part, ast.Assign) and ast.unparse(part.targets[0]) == "__all__"
 
