@@ -251,8 +251,9 @@ class _Query:
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
         way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
-        # Labels that were corrected since may have made it even shorter than was told.
-        self.cost = int(improving.way_cost(*self._map, way, 0, len(way) - 1))
+        if self.run.state[MEETING] >= 0:
+            # Labels that were corrected since may have made it even shorter than was told.
+            self.cost = int(improving.way_cost(*self._map, way, 0, len(way) - 1))
         return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from planners.frontier import NOT_FIRST, NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "b5d2c8c02942"
+CALLED = "b86d788aa346"
 
 SIDE, MOST = 8, 32
 UNKNOWN = 255

@@ -6,7 +6,9 @@ orthogonal cells, so corners are never cut. Labels and bases are those of `plann
 
 Kernels of other files call these, and numba's cache does not see a callee in another file change.
 So a file with kernels states the digest of the files it calls as `CALLED` (a test compares): who
-changes this file touches those, and all of their machine code is made anew.
+changes this file touches those, and all of their machine code is made anew. And who moves a tuple
+of arrays to another file moves the kernels that take it by a line: their stored signatures name the
+file where it was.
 """
 
 import numpy as np
@@ -174,7 +176,8 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
                 if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
                     continue
                 there = node + dr * columns + dc
-                if label[there] <= label[node]:
+                least = DIAGONAL if dr != 0 and dc != 0 else STRAIGHT
+                if label[there] <= label[node] or label[there] - least <= best_label:
                     continue
                 step = step_cost(cost, wall, columns, there, -dr, -dc)
                 # Every label is the length of a real way, so the best neighbour is closer by it.

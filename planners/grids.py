@@ -15,7 +15,7 @@ from planners.path_finding import Cell, flat, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "9f8d4e5660ac"
+CALLED = "30f32f9350a6"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much
@@ -74,7 +74,7 @@ class Grid:
 
     @cached_property
     def features(self) -> tuple[float, float, int]:
-        """(density of what is blocked, its clustering, cells looked at for it): see `blocks`."""
+        """(density of what is blocked, its clustering, cells looked at): see `map_features`."""
         return features(self.cost, self.wall, self.dearest, self.shape[1], _SAMPLE)
 
     def update(self, top: int, left: int, domain: NDArray[np.floating]) -> None:

@@ -5,7 +5,7 @@ from numba import njit
 
 from planners.blocks import SIDE
 
-CALLED = "b39e18bc19ba"
+CALLED = "f25dedbf315a"
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

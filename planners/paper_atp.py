@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "ba4442de4e6c"
+CALLED = "4c03347766e3"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

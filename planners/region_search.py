@@ -14,7 +14,7 @@ from planners.blocks import ALL, EXPANDED, MOST, SIDE, TOUCHED, know, region_of
 from planners.frontier import detour, flood, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "b39e18bc19ba"
+CALLED = "f25dedbf315a"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9

@@ -1,7 +1,8 @@
 """From a way over regions to a way over cells: pins where borders are crossed, lines between them.
 
 Where no line goes from one pin to the next, both in a region of at most 64 cells, the way is found
-there by waves of a word: all cells that can be reached in one step more, eight ways at a time.
+there by waves of a word: all cells that can be reached in one step more, eight ways at a time,
+which takes some twenty operations.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
 from planners.region_search import LAST_REGION
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "13f3879212b2"
+CALLED = "e178e059d0a8"
 
 TAUT = 2
 """How often pins are drawn taut."""

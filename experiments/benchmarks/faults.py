@@ -70,15 +70,14 @@ def measure(
     progress(f"missions: {lived} with one to three faults each")
     figures |= _missions(program, lived, seed, settings)
     progress(f"connected: {floors} floors, planners that return rubbish three times in ten")
-    reached = [_reaches(program, number, seed) for number in range(floors)]
-    figures |= share_interval("connected.reached", reached)
+    figures |= connected(floors, seed)
     progress(f"kills: {killed} of each of {len(kills.WRITERS)} writers")
     outcomes = [*kills.killed(killed, seed), *((corrupt, False) for corrupt in kills.failing())]
     figures["kills.corrupt"] = sum(corrupt for corrupt, _ in outcomes)
     figures["kills.lost"] = sum(lost for _, lost in outcomes)
     figures["kills.count"] = len(outcomes)
     progress(f"return_bound: {trials} trials of {len(MISBEHAVING)} misbehaving modules")
-    figures |= _return_bound(trials, settings)
+    figures |= return_bound(trials, settings)
     progress(f"halt: {links} faults of links to a walking robot")
     figures |= _halt(links, seed, settings)
     progress(f"qi: {clients} connections that speak nonsense, and as many calls")
@@ -154,6 +153,13 @@ def _children() -> int:
     return 1
 
 
+def connected(count: int, seed: int) -> dict[str, float | int | None]:
+    """`connected.reached` over so many floors with a way, a fifth of each kind."""
+    program = crossings.compiled()
+    reached = [_reaches(program, number, seed) for number in range(count)]
+    return share_interval("connected.reached", reached)
+
+
 def _reaches(program: CompiledProgram, number: int, seed: int) -> bool:
     """Whether a floor with a way is crossed though plans are rubbish three times in ten."""
     kind = crossings.KINDS[number % len(crossings.KINDS)]
@@ -168,7 +174,8 @@ def _reaches(program: CompiledProgram, number: int, seed: int) -> bool:
     return monitor.run(crossings.ENDLESS, robot, seed=floor.seed).ending is Ending.REACHED
 
 
-def _return_bound(trials: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+def return_bound(trials: int, settings: dict[str, Any]) -> dict[str, float | int | None]:
+    """How much later than its contract control is back, whatever an isolated module does."""
     over: list[float] = []
     floors: list[float] = []
     worst, repeated = "", 0
