@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,6 +110,12 @@ class Spread:
         return np.array(self.ratios[max(row, 0)])
 
 
+@cache
+def _speeds(least: float, greatest: float) -> Floats:
+    """Those that are chosen among, [V]; made once, for it takes as long as to foresee them all."""
+    return np.geomspace(least, greatest, SPEEDS)
+
+
 def foresee(
     mission: Mission, contracts: Contracts, rhythm: Rhythm, state: State, speeds: Floats
 ) -> tuple[Floats, Floats]:
@@ -138,7 +145,7 @@ def best_contract(
     mission: Mission, contracts: Contracts, rhythm: Rhythm, spread: Spread, state: State
 ) -> Decision:
     """t_c = argmax VOT − COE, with the speed chosen together with it. [ZR93] §5."""
-    speeds = np.geomspace(*mission.speeds, SPEEDS)
+    speeds = _speeds(*mission.speeds)
     seconds, energy = foresee(mission, contracts, rhythm, state, speeds)
     # The spread is known for what was chosen, so it is looked up where one would go without it.
     plain = _value_and_cost(mission, state, seconds, energy, np.ones(1))

@@ -1,5 +1,5 @@
-"""The monitor: what policies lose against the optimum of sixteen decision processes, what a
-decision takes, and stopping rules on recorded traces."""
+"""The monitor: what policies lose on computed and on simulated missions, what a decision takes, and
+stopping rules on recorded traces."""
 
 from __future__ import annotations
 
@@ -13,40 +13,25 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from anytime.executors import processes
 from experiments import shipped
-from experiments.benchmarks.figures import Benchmark, Figures, median_interval, ratio_interval
+from experiments.benchmarks.figures import Benchmark, Figures, median_interval
 from experiments.benchmarks.monitor_gate import gate_figures
-from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_kinds import kinds
 from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
+from experiments.benchmarks.monitor_losses import MISSIONS, loss_figures, losses
 from experiments.benchmarks.monitor_news import news_figures
 from experiments.benchmarks.monitor_traces import losses_on, trace_figures
 from experiments.benchmarks.monitor_visits import visit_figures
 from experiments.benchmarks.monitor_world import CELLS, QUICK, STANDARD, live_cell, world_figures
-from monitor.certainty import resolve
-from monitor.decision_process import DecisionProcess, Moment
-from monitor.decision_table import (
-    DecisionTable,
-    evaluate,
-    simulate,
-    solve,
-    solve_cautiously,
-)
-from monitor.frame_rules import (
-    argmax_contract,
-    evaluate_frames,
-    paper_rule,
-    simulate_frames,
-    tuned_constant_rule,
-)
+from monitor.decision_process import Moment
+from monitor.decision_table import DecisionTable, solve
+from monitor.frame_rules import argmax_contract
 from monitor.robots.briefing import QUICK as BRIEF
 from monitor.robots.briefing import brief
 from monitor.robots.grid_missions import read_mission
 from sensing import trace_folder
 
 Floats = NDArray[np.float64]
-MISSIONS = 5_000  # that check each computed worth
-TUNING = 300  # missions for the fixed rule
-GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time
 DECISIONS = 100_000
 _PARTS = 20  # into which they are divided, in their order, for an interval
 TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
@@ -75,27 +60,6 @@ def measure(
     elif not paths:
         raise AnytimeError(f"--traces {folder}: no .json file in it")
     figures: Figures = {}
-    found: dict[str, list[float]] = {}
-    deviations: list[float] = []
-    solving: list[float] = []
-    for (noise, planner, value), process in kinds().items():
-        progress(f"{noise} noise, {planner} planner, {value} value")
-        lost = losses(process, seed, deviations, solving)
-        for policy, loss in lost.items():
-            found.setdefault(policy, []).append(loss)
-            figures[f"kind.{noise}_{planner}_{value}.{policy}"] = loss
-    for policy, values in found.items():
-        figures[f"loss.{policy}.mean"] = float(np.mean(values))
-        figures[f"loss.{policy}.worst"] = float(np.max(values))
-    kept = {policy: 1.0 - np.array(values) for policy, values in found.items()}
-    for policy in ("paper", "inter", "fixed"):
-        figures |= ratio_interval(f"loss.vs_{policy}", kept["optimal"], kept[policy])
-    figures["loss.paper.at_least_4_percent"] = int(np.sum(np.array(found["paper"]) >= 0.04))
-    figures["check.count"] = len(deviations)
-    figures["check.within_three_errors"] = float(np.mean(np.abs(deviations) <= 3.0))
-    figures["check.greatest_errors"] = float(np.max(np.abs(deviations)))
-    figures["solve_s"] = float(np.median(solving))
-    figures["solve_s_worst"] = float(np.max(solving))
     progress("decisions")
     process = kinds()["high", "slow", "exponential"]
     table = solve(process)
@@ -116,7 +80,7 @@ def measure(
 def _beside(
     quick: bool, seed: int, traces: Sequence[Path], progress: Callable[[str], None]
 ) -> tuple[Figures, dict[str, object]]:
-    """What times nothing, in two processes: the world, the gate, news, visits, traces."""
+    """What goes on in two processes: kinds of mission, the world, gate, news, visits, traces."""
     size = QUICK if quick else STANDARD
     figures: Figures = {}
     settings: dict[str, object] = {}
@@ -128,12 +92,14 @@ def _beside(
             pool.submit(visit_figures, seed, QUICK_TRIALS if quick else VISITS),
         )
         sets = {path.stem: pool.submit(losses_on, path, seed) for path in traces}
+        kept = {kind: pool.submit(losses, kind, seed) for kind in kinds()}
         cells = {}
         for (kind, many), job in worlds.items():
             cells[kind, many] = job.result()
             progress(f"world: {kind} value, {'many pairs' if many else 'one pair'}")
         found = [world_figures(cells, size), gate.result()]
-        progress("gate, news, visits")
+        progress("gate, news, visits, kinds of mission")
+        figures |= loss_figures({kind: job.result() for kind, job in kept.items()})
         figures |= others[0].result() | others[1].result()
         if sets:
             told, settings["rules_chosen"] = trace_figures(
@@ -145,52 +111,6 @@ def _beside(
         figures |= more
         settings |= also
     return figures, settings
-
-
-def losses(
-    process: DecisionProcess, seed: int, deviations: list[float], solving: list[float]
-) -> dict[str, float]:
-    """Share of the optimum's worth that each policy loses in a process, computed.
-
-    Appends by how many standard errors 5,000 simulated missions differ from each computed worth,
-    and the seconds that the optimum took.
-    """
-    chance = np.random.default_rng([seed, 2]).random((TUNING, process.ticks, 2))
-    rules = {
-        "paper": paper_rule(process, GAIN),
-        "inter": paper_rule(process),
-        "fixed": tuned_constant_rule(process, chance),
-    }
-    solve(process)  # loads the machine code
-    began = time.perf_counter()
-    exact = solve(process)
-    solving.append(time.perf_counter() - began)
-    cautious = solve_cautiously(process)
-    tables = {
-        "exact": exact.actions,
-        "optimal": cautious.actions,
-        "resolve": resolve(process),
-        "smoothed": resolve(process, CAUTION),
-    }
-    worth = {name: evaluate(process, actions) for name, actions in tables.items()}
-    worth |= {name: evaluate_frames(process, rule) for name, rule in rules.items()}
-    rng = np.random.default_rng([seed, 3])
-    for name, actions in tables.items():
-        deviations.append(_deviation(worth[name], simulate(process, actions, MISSIONS, rng)))
-    for name, rule in rules.items():
-        chance = rng.random((MISSIONS, process.ticks, 2))
-        deviations.append(_deviation(worth[name], simulate_frames(process, rule, chance)))
-    lost = {name: 1.0 - value / exact.promised for name, value in worth.items()}
-    true = process.slower(SLOWER)
-    best = solve(true).promised
-    lost["wrong_profile"] = 1.0 - evaluate(true, cautious.actions) / best
-    lost["wrong_profile_exact"] = 1.0 - evaluate(true, exact.actions) / best
-    return lost
-
-
-def _deviation(worth: float, nets: Floats) -> float:
-    error = float(nets.std(ddof=1)) / np.sqrt(len(nets))
-    return (float(nets.mean()) - worth) / max(error, 1e-9)
 
 
 def decision_times(

@@ -44,7 +44,7 @@ class Size:
     candidates: int = 300
 
 
-STANDARD = Size(missions=200, further=300, pairs=5, raced=True, hindsight=5)
+STANDARD = Size(missions=200, further=300, pairs=5, raced=True, hindsight=3)
 QUICK = Size(missions=30, further=0, pairs=1, raced=False, hindsight=0)
 CELLS = [(value.kind, many) for many in (False, True) for value in VALUES]
 

@@ -44,7 +44,7 @@ class Effort:
     levels: int = 6
     rhythm_seeds: int = 12
     seeds: int = 16
-    choice_seeds: int = 20
+    choice_seeds: int = 40
 
 
 QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, choice_seeds=4)
@@ -55,7 +55,7 @@ def effort_for(scene: Scene) -> Effort:
     """The effort that a scene needs: less the longer its missions are."""
     share = min(1.0, LONG / max(scene.optimal, 1.0)) if np.isfinite(scene.optimal) else 0.0
     return Effort(
-        6, max(3, round(12 * share)), max(6, round(16 * share)), max(6, round(20 * share))
+        6, max(3, round(12 * share)), max(6, round(16 * share)), max(6, round(40 * share))
     )
 
 
