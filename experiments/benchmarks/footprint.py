@@ -70,4 +70,5 @@ def _bytes(package: str) -> int:
             for path in (home / folder).rglob("*")
             if path.is_file() and "__pycache__" not in path.parts
         )
-    return sum(Path(str(file.locate())).stat().st_size for file in files if file.locate().is_file())
+    paths = (Path(str(file.locate())) for file in files)
+    return sum(path.stat().st_size for path in paths if path.is_file())
