@@ -172,18 +172,22 @@ def _isotonic(levels: Floats, values: Floats) -> Calibration:
     pooled = np.array([values[:, block].mean(axis=1) for block in blocks]).T  # [P, blocks]
     low, high = mean_interval(pooled)
     sizes = [block.stop - block.start for block in blocks]
+    # Means of equal numbers in another order differ in the last bit, and must not fall by it.
+    mean = np.minimum(np.maximum.accumulate(pooled.mean(axis=0)), 1.0)
     columns = (
-        pooled.mean(axis=0),
-        np.minimum.accumulate(low[::-1])[::-1],
-        np.maximum.accumulate(high),
+        mean,
+        np.minimum(np.minimum.accumulate(low[::-1])[::-1], mean),
+        np.maximum(np.maximum.accumulate(high), mean),
     )
     promised, low, high = (np.repeat(column, sizes) for column in columns)
-    return Calibration(
+    rows = np.array([
         np.concatenate([[0.0], levels, [1.0 + 1e-9]]),
         np.concatenate([[0.0], promised, [1.0]]),
         np.concatenate([[0.0], low, low[-1:]]),
         np.concatenate([high[:1], high, [1.0]]),
-    )
+    ])  # fmt: skip
+    # Of knots at one level the last stands: a division that is worth nothing by the tables.
+    return Calibration(*rows[:, np.append(np.diff(rows[0]) > 0, True)])
 
 
 def _unseen(

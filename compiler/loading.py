@@ -299,7 +299,7 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
     promised = np.array(stored.promised, dtype=float)
     if promised[0] < 0 or promised[-1] > 1 + 1e-6 or (np.diff(promised) < 0).any():
         raise AnytimeError(f"{path}: promised qualities must lie in [0, 1] and not decrease")
-    _check_calibration(path, np.array(stored.calibration, dtype=float).reshape(-1, 4))
+    check_calibration(path, np.array(stored.calibration, dtype=float).reshape(-1, 4))
     if not 0 <= stored.regret <= 1:
         raise AnytimeError(f"{path}: a regret of {stored.regret}; it lies in [0, 1]")
     for name, rows in stored.steps.items():
@@ -311,7 +311,8 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
             raise AnytimeError(f"{path}: steps.{name} is not two rows of seconds >= 0")
 
 
-def _check_calibration(path: Path, rows: Floats) -> None:
+def check_calibration(path: Path, rows: Floats) -> None:
+    """Raise AnytimeError if rows [K, 4] of a calibration contradict each other."""
     if not len(rows) or rows.min() < 0 or rows[:, 1:].max() > 1 + 1e-6:
         raise AnytimeError(f"{path}: calibration needs a row at least, of numbers in [0, 1]")
     if (np.diff(rows[:, 0]) <= 0).any() or (np.diff(rows[:, 1:], axis=0) < 0).any():
