@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from anytime.executors import processes
-from experiments import shipped
-from experiments.benchmarks import campaign, deadline, faults, mission, monitor, nao, planner, query
+from experiments.benchmarks import campaign, deadline, faults, monitor, planner, query
 from experiments.benchmarks.compiler_engine import races as compiler_races
 from experiments.benchmarks.figures import Figures
 from experiments.benchmarks.monitor_kinds import kinds
@@ -22,8 +20,6 @@ from experiments.benchmarks.planner_checks import put_peers
 from experiments.benchmarks.planner_races import Problem, races
 from experiments.benchmarks.rivals import installed
 from monitor.decision_table import solve
-from monitor.robots.briefing import brief
-from monitor.robots.grid_missions import read_mission
 
 INSTANCES = 30  # of a family
 _FAMILIES = {"iid.512.r20": "r20", "rooms.512": "rooms"}
@@ -34,11 +30,10 @@ CUT = (
     "compiler: beside the time domain and ten seconds of CP-SAT alone",
     f"query: beside C++, plain Python, Optuna, and {', '.join(_SEARCHES)}, 6 seeds of a second",
     "monitor: decisions alone",
-    "mission: 30 seeds of one task value, beside the fixed division of the mission's file",
-    "nao: 30 worlds",
     "faults: 60 misbehaving modules, 30 floors",
     "deadline: 120 contracts with the cores free",
     "campaign: its overhead alone",
+    "mission, nao: not measured",
 )
 """What the full form has besides."""
 
@@ -78,16 +73,6 @@ def _query(seed: int, settings: dict[str, Any]) -> Figures:
     return figures | query.peers(rivals, range(seed, seed + 6), 1.0, settings)
 
 
-def _mission(seed: int, settings: dict[str, Any]) -> Figures:
-    briefing = brief(read_mission(shipped.mission_path()), shipped.profiles())
-    return mission.values(mission.live(briefing, INSTANCES))
-
-
-def _nao(seed: int, settings: dict[str, Any]) -> Figures:
-    with processes(2) as pool:
-        return nao.worlds(pool, INSTANCES, seed, lambda message: None)
-
-
 def _faults(seed: int, settings: dict[str, Any]) -> Figures:
     return faults.return_bound(2 * INSTANCES, settings) | faults.connected(INSTANCES, seed)
 
@@ -105,9 +90,7 @@ SAMPLES: dict[str, Callable[[int, dict[str, Any]], Figures]] = {
     "planner": _planner,
     "compiler": _compiler,
     "monitor": _monitor,
-    "mission": _mission,
     "query": _query,
-    "nao": _nao,
     "faults": _faults,
     "deadline": _deadline,
     "campaign": _campaign,
