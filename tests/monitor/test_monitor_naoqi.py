@@ -285,7 +285,12 @@ def test_connections_that_speak_nonsense_harm_nobody(rig):
 
 
 def test_a_server_ends_on_ctrl_c(rig):
-    server = rig.keep(ServedNao("--lockstep"))
+    # Who runs the tests in the background of a script has them ignore it, and so what they start.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        server = rig.keep(ServedNao("--lockstep"))
+    finally:
+        signal.signal(signal.SIGINT, before)
     server.process.send_signal(signal.SIGINT)
     assert server.process.wait(10.0) == 130
 
