@@ -113,7 +113,9 @@ class Spread:
 @cache
 def _speeds(least: float, greatest: float) -> Floats:
     """Those that are chosen among, [V]; made once, for it takes as long as to foresee them all."""
-    return np.geomspace(least, greatest, SPEEDS)
+    speeds = np.geomspace(least, greatest, SPEEDS)
+    speeds.flags.writeable = False  # all who ask get this one
+    return speeds
 
 
 def foresee(

@@ -2,7 +2,7 @@
 
 Where no line goes from one pin to the next, both in a region of at most 64 cells, the way is found
 there by waves of a word: all cells that can be reached in one step more, eight ways at a time,
-which takes some twenty operations.
+which takes some forty operations.
 """
 
 import numpy as np

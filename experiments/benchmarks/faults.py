@@ -70,7 +70,7 @@ def measure(
     progress(f"missions: {lived} with one to three faults each")
     figures |= _missions(program, lived, seed, settings)
     progress(f"connected: {floors} floors, planners that return rubbish three times in ten")
-    figures |= connected(floors, seed)
+    figures |= connected(program, floors, seed)
     progress(f"kills: {killed} of each of {len(kills.WRITERS)} writers")
     outcomes = [*kills.killed(killed, seed), *((corrupt, False) for corrupt in kills.failing())]
     figures["kills.corrupt"] = sum(corrupt for corrupt, _ in outcomes)
@@ -153,9 +153,8 @@ def _children() -> int:
     return 1
 
 
-def connected(count: int, seed: int) -> dict[str, float | int | None]:
+def connected(program: CompiledProgram, count: int, seed: int) -> dict[str, float | int | None]:
     """`connected.reached` over so many floors with a way, a fifth of each kind."""
-    program = crossings.compiled()
     reached = [_reaches(program, number, seed) for number in range(count)]
     return share_interval("connected.reached", reached)
 

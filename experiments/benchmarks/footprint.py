@@ -10,8 +10,6 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-import numpy as np
-
 from experiments.benchmarks.figures import Figures
 
 OURS = "anytime-robots"
@@ -32,7 +30,7 @@ def footprint() -> Figures:
 
 def cpu_seconds(command: Sequence[str]) -> float:
     """What a command takes of the processor, seconds: the least, for the rest is the machine's."""
-    return float(np.min([_once(command) for _ in range(_TURNS)]))
+    return min(_once(command) for _ in range(_TURNS))
 
 
 def _once(command: Sequence[str]) -> float:

@@ -49,8 +49,8 @@ def measure(
         briefing = _with_raced(briefing)
         settings["fixed"] = dict(briefing.grid.mission.fixed)
     progress(f"{grid.mission.value.kind} value: {SEEDS} seeds, {len(ROWS)} policies")
-    reports = live(briefing, SEEDS)
-    figures |= values(reports)
+    reports = _live(briefing)
+    figures |= _values(reports)
     if quick:
         for key in ("value.hindsight", "gap.hindsight", "gap.normalised"):
             figures[key] = None
@@ -63,7 +63,7 @@ def measure(
             other = replace(grid, mission=replace(grid.mission, value=value))
             figures |= {
                 f"{value.kind}.{key}": figure
-                for key, figure in values(live(_with_raced(brief(other, library)), SEEDS)).items()
+                for key, figure in _values(_live(_with_raced(brief(other, library)))).items()
             }
     count = 30 if quick else 100
     program = crossings.compiled()
@@ -93,17 +93,15 @@ def _with_raced(briefing: Briefing) -> Briefing:
     return replace(briefing, grid=replace(briefing.grid, mission=mission))
 
 
-def live(briefing: Briefing, seeds: int) -> dict[str, list[Report]]:
-    """Missions by policy, on the same seeds."""
+def _live(briefing: Briefing) -> dict[str, list[Report]]:
     reports: dict[str, list[Report]] = {}
     for row, policy in ROWS.items():
         monitor = briefing.monitor(policy)
-        reports[row] = [briefing.live(monitor, seed) for seed in range(seeds)]
+        reports[row] = [briefing.live(monitor, seed) for seed in range(SEEDS)]
     return reports
 
 
-def values(reports: dict[str, list[Report]]) -> dict[str, float | int | None]:
-    """Figures under `value.`, and `gap.promised`."""
+def _values(reports: dict[str, list[Report]]) -> dict[str, float | int | None]:
     nets = {row: np.array([report.net for report in lived]) for row, lived in reports.items()}
     figures: dict[str, float | int | None] = {
         f"value.{row}": float(net.mean()) for row, net in nets.items()

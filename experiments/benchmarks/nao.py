@@ -61,7 +61,13 @@ def measure(
         figures |= share_interval("plan.stands_and_goes_round", shortest)
         _scenes(figures, pool, seeds, progress)
         count = nao_worlds.EXPLAINED if quick else 1000
-        figures |= worlds(pool, count, seed, progress)
+        worlds: list[Outcome] = []
+        explained = [number < nao_worlds.EXPLAINED for number in range(count)]
+        for found in pool.map(outcome, range(seed, seed + count), explained):
+            if len(worlds) % 100 == 0:
+                progress(f"worlds {len(worlds)} to {min(len(worlds) + 100, count)} of {count}")
+            worlds.append(found)
+    figures |= nao_worlds.figures(worlds)
     _connection(figures, reasons, seed, progress)
     _oracle(figures, reasons, range(seed, seed + 40), progress)
     settings = {
@@ -71,19 +77,6 @@ def measure(
         "not_measured": reasons,
     }
     return Benchmark("nao", figures, settings, seed)
-
-
-def worlds(
-    pool: Executor, count: int, seed: int, progress: Callable[[str], None]
-) -> dict[str, float | int | None]:
-    """Figures under `worlds.`: of so many random ones, the first of them explained."""
-    found: list[Outcome] = []
-    explained = [number < nao_worlds.EXPLAINED for number in range(count)]
-    for one in pool.map(outcome, range(seed, seed + count), explained):
-        if len(found) % 100 == 0:
-            progress(f"worlds {len(found)} to {min(len(found) + 100, count)} of {count}")
-        found.append(one)
-    return nao_worlds.figures(found)
 
 
 def _scenes(

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from compiler.elimination import warm_up
+from experiments import crossings
 from experiments.benchmarks import campaign, deadline, faults, monitor, planner, query
 from experiments.benchmarks.compiler_engine import races as compiler_races
 from experiments.benchmarks.figures import Figures
@@ -76,7 +77,8 @@ def _query(seed: int, settings: dict[str, Any]) -> Figures:
 
 
 def _faults(seed: int, settings: dict[str, Any]) -> Figures:
-    return faults.return_bound(INSTANCES, settings) | faults.connected(INSTANCES, seed)
+    figures = faults.return_bound(INSTANCES, settings)
+    return figures | faults.connected(crossings.compiled(), INSTANCES, seed)
 
 
 def _deadline(seed: int, settings: dict[str, Any]) -> Figures:
