@@ -24,7 +24,7 @@ SLIGHT = 0.1  # weight of a run that is not like the one seen, against one that 
 STIFF = 0.05  # of the slope of a local line
 LAGS = (0.0125, 0.0375, 0.1, 0.25)  # shares of the times over which slopes are taken
 WINDOW = 0.25  # share of the times at either side that is pooled
-RIDGE, RIDGE_OF_VALUES = 0.03, 0.2  # of standardised features, times the number of runs
+RIDGE, RIDGE_OF_VALUES = 0.1, 0.2  # of standardised features, times the number of runs
 FEWEST = 10  # looks before a curve is projected
 TINY = 1e-9
 

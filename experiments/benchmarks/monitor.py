@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,16 +14,17 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from anytime.executors import processes
 from experiments import shipped
+from experiments.benchmarks import monitor_world
 from experiments.benchmarks.figures import Benchmark, Figures, median_interval
 from experiments.benchmarks.monitor_gate import gate_figures
-from experiments.benchmarks.monitor_kinds import kinds
+from experiments.benchmarks.monitor_kinds import KINDS, Kind, kinds
 from experiments.benchmarks.monitor_knobs import knob_figures
 from experiments.benchmarks.monitor_living import fork_figures, share_of_cpu
 from experiments.benchmarks.monitor_losses import MISSIONS, loss_figures, losses
 from experiments.benchmarks.monitor_news import news_figures
-from experiments.benchmarks.monitor_traces import losses_on, trace_figures
+from experiments.benchmarks.monitor_traces import FOLDS, losses_on, trace_figures
 from experiments.benchmarks.monitor_visits import visit_figures
-from experiments.benchmarks.monitor_world import CELLS, QUICK, STANDARD, live_cell, world_figures
+from experiments.benchmarks.monitor_world import CELLS, live_cell, world_figures
 from monitor.decision_process import Moment
 from monitor.decision_table import DecisionTable, solve
 from monitor.frame_rules import argmax_contract
@@ -34,9 +36,33 @@ from sensing import trace_folder
 Floats = NDArray[np.float64]
 DECISIONS = 100_000
 _PARTS = 20  # into which they are divided, in their order, for an interval
-TRIALS, QUICK_TRIALS = 100, 30  # of the value gate
-NEWS = 60  # missions in which a deadline becomes known
-VISITS = 60  # rounds through several goals
+
+
+@dataclass(frozen=True)
+class Size:
+    """kinds: of mission that are computed. folds: of each set of traces. trials: of the value gate,
+    and lived: missions that its foreseen loss is held against. news: missions in which a deadline
+    becomes known. visits: rounds through several goals."""
+
+    kinds: tuple[Kind, ...]
+    world: monitor_world.Size
+    folds: int
+    trials: int
+    lived: int
+    news: int
+    visits: int
+
+
+STANDARD = Size(KINDS, monitor_world.STANDARD, FOLDS, 100, 150, 60, 60)
+QUICK = Size(
+    tuple(kind for kind in KINDS if kind[:2] == ("high", "slow")),
+    monitor_world.QUICK,
+    folds=3,
+    trials=30,
+    lived=30,
+    news=30,
+    visits=30,
+)
 
 
 def measure(
@@ -71,33 +97,36 @@ def measure(
     figures |= knob_figures(seed)
     progress("a mission in real time")
     figures |= share_of_cpu(briefing, seed)
-    of_parts, of_settings = _beside(quick, seed, paths, progress)
+    of_parts, of_settings = _beside(QUICK if quick else STANDARD, seed, paths, progress)
     figures |= of_parts
     settings |= of_settings
     return Benchmark("monitor", figures | dict.fromkeys(missing), settings, seed)
 
 
 def _beside(
-    quick: bool, seed: int, traces: Sequence[Path], progress: Callable[[str], None]
+    size: Size, seed: int, traces: Sequence[Path], progress: Callable[[str], None]
 ) -> tuple[Figures, dict[str, object]]:
     """What goes on in two processes: kinds of mission, the world, gate, news, visits, traces."""
-    size = QUICK if quick else STANDARD
     figures: Figures = {}
-    settings: dict[str, object] = {}
+    settings: dict[str, object] = {
+        "kinds": len(size.kinds),
+        "folds": size.folds,
+        "effort": asdict(size.world.effort) if size.world.effort else "usual",
+    }
     with processes(2) as pool:
-        worlds = {key: pool.submit(live_cell, *key, size, seed) for key in CELLS}
-        gate = pool.submit(gate_figures, seed, QUICK_TRIALS if quick else TRIALS)
+        worlds = {key: pool.submit(live_cell, *key, size.world, seed) for key in CELLS}
+        gate = pool.submit(gate_figures, seed, size.trials, size.lived)
         others = (
-            pool.submit(news_figures, seed, QUICK_TRIALS if quick else NEWS),
-            pool.submit(visit_figures, seed, QUICK_TRIALS if quick else VISITS),
+            pool.submit(news_figures, seed, size.news),
+            pool.submit(visit_figures, seed, size.visits),
         )
-        sets = {path.stem: pool.submit(losses_on, path, seed) for path in traces}
-        kept = {kind: pool.submit(losses, kind, seed) for kind in kinds()}
+        sets = {path.stem: pool.submit(losses_on, path, seed, size.folds) for path in traces}
+        kept = {kind: pool.submit(losses, kind, seed) for kind in size.kinds}
         cells = {}
         for (kind, many), job in worlds.items():
             cells[kind, many] = job.result()
             progress(f"world: {kind} value, {'many pairs' if many else 'one pair'}")
-        found = [world_figures(cells, size), gate.result()]
+        found = [world_figures(cells, size.world), gate.result()]
         progress("gate, news, visits, kinds of mission")
         figures |= loss_figures({kind: job.result() for kind, job in kept.items()})
         figures |= others[0].result() | others[1].result()

@@ -21,12 +21,12 @@ from monitor.value_gate import gate
 PROBLEMS = 60
 SLOWER = 1.2
 JITTER = 0.05  # by which a run's seconds vary from measuring to measuring (log-normal)
-LIVED = 150  # missions with and without the slow-down, to hold the foreseen loss against
 Figures = dict[str, float | int | None]
 
 
-def gate_figures(seed: int, trials: int) -> tuple[Figures, dict[str, object]]:
-    """Figures under `gate.`, and the settings.
+def gate_figures(seed: int, trials: int, lived: int) -> tuple[Figures, dict[str, object]]:
+    """Figures under `gate.`, and the settings; lived: missions with and without the slow-down, to
+    hold the foreseen loss against.
 
     found: share of trials in which `see`, a fifth slower, is called a loss; `found_planner` the
     same of `find_path`, which takes a tenth of a contract. false_alarms: share without a change.
@@ -58,7 +58,7 @@ def gate_figures(seed: int, trials: int) -> tuple[Figures, dict[str, object]]:
     }
     slow = _slowed(library, {"see": SLOWER})
     figures["gate.foreseen"] = gate(known, shifts_of_libraries(navigate, library, slow)).loss
-    figures |= _lived_loss(grid, briefing, library)
+    figures |= _lived_loss(grid, briefing, library, lived)
     settings = {
         "gate.trials": trials,
         "gate.problems": PROBLEMS,
@@ -96,12 +96,14 @@ def _slowed(
     return ProfileLibrary(profiles=profiles, machine=library.machine)
 
 
-def _lived_loss(grid: GridMission, briefing: Briefing, library: ProfileLibrary) -> Figures:
+def _lived_loss(
+    grid: GridMission, briefing: Briefing, library: ProfileLibrary, missions: int
+) -> Figures:
     """What the slow-down costs missions that are lived, calibrated anew, on the same seeds."""
     rate = SLOWER * grid.machine.rates["see"].per_work
     slow = brief(replace(grid, machine=grid.machine.with_rate("see", rate)), library)
     nets = []
     for each in (briefing, slow):
         monitor = each.monitor("expected")
-        nets.append(np.array([each.live(monitor, seed).net for seed in range(LIVED)]))
+        nets.append(np.array([each.live(monitor, seed).net for seed in range(missions)]))
     return {**bootstrap(nets, lambda before, after: before - after).under("gate.lived")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from monitor.decision_process import DecisionProcess, steady_planning, uneven_progress
 from monitor.missions import Value
 
+Kind = tuple[str, str, str]
+"""(noise, planner, value)."""
 FRAMES, LEVELS, TICKS = 8, 10, 260
 LENGTH = 44  # cells of a frame with the best plan
 # Walked by a plan of each level: its quality is .5 + .05 × level.
@@ -19,6 +22,9 @@ ENERGY = 0.015  # × speed², a tick
 NOISES: Mapping[str, tuple[float, ...]] = {"low": (0.9, 1.0, 1.1), "high": (0.4, 1.0, 1.3)}
 SHARES = (0.25, 0.5, 0.25)  # of the three factors by which a tick's progress is off
 RATES: Mapping[str, float] = {"fast": 0.9, "slow": 0.4}  # levels a tick
+KINDS: tuple[Kind, ...] = tuple(
+    itertools.product(NOISES, RATES, ("linear", "exponential", "soft", "hard"))
+)
 SLOWER = 1.3  # ticks that a planner needs, in times of what is believed of it
 
 
@@ -33,20 +39,18 @@ def values() -> dict[str, NDArray[np.float64]]:
     }
 
 
-def kinds() -> dict[tuple[str, str, str], DecisionProcess]:
-    """The processes by (noise, planner, value)."""
-    speeds = np.array(SPEEDS)
+def kinds() -> dict[Kind, DecisionProcess]:
+    """The processes of all kinds."""
+    speeds, worths = np.array(SPEEDS), values()
     return {
         (noise, planner, kind): DecisionProcess(
             frames=FRAMES,
             lengths=LENGTHS,
-            planning=steady_planning(LEVELS, rate),
+            planning=steady_planning(LEVELS, RATES[planner]),
             speeds=SPEEDS,
-            progress=uneven_progress(speeds, factors, SHARES),
+            progress=uneven_progress(speeds, NOISES[noise], SHARES),
             energy=ENERGY * speeds**2,
-            value=value,
+            value=worths[kind],
         )
-        for noise, factors in NOISES.items()
-        for planner, rate in RATES.items()
-        for kind, value in values().items()
+        for noise, planner, kind in KINDS
     }

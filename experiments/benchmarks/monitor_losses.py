@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.benchmarks.figures import Figures, ratio_interval
-from experiments.benchmarks.monitor_kinds import SLOWER, kinds
+from experiments.benchmarks.monitor_kinds import SLOWER, Kind, kinds
 from monitor.certainty import resolve
 from monitor.decision_table import evaluate, simulate, solve, solve_cautiously
 from monitor.frame_rules import (
@@ -21,7 +21,6 @@ from monitor.frame_rules import (
 )
 
 Floats = NDArray[np.float64]
-Kind = tuple[str, str, str]
 MISSIONS = 5_000  # that check each computed worth
 TUNING = 300  # missions for the fixed rule
 GAIN, CAUTION = 1.0, 2.0  # of the paper's rule within frames, of the risk-smoothed value of time

@@ -92,30 +92,33 @@ def read_traces(path: Path) -> TraceSet:
 
 
 def cross_validate(
-    traces: TraceSet, seed: int, learners: Mapping[str, Learner] = LEARNERS
+    traces: TraceSet,
+    seed: int,
+    learners: Mapping[str, Learner] = LEARNERS,
+    folds: int = FOLDS,
 ) -> TraceLosses:
     """Choose a rule by cross-validation within all folds but one, and judge it on that one."""
     runs, task = traces.runs, traces.task
     order = np.random.default_rng(seed).permutation(len(runs))
-    folds = parts(len(runs), FOLDS, order)
+    held = parts(len(runs), folds, order)
     losses = {
-        name: 100.0 * held_out(runs, task, learner, folds)
+        name: 100.0 * held_out(runs, task, learner, held)
         for name, learner in {"fixed": fixed_contract, **learners}.items()
     }
     losses["chosen"] = np.zeros(len(runs))
     chosen: list[str] = []
-    for index, fold in enumerate(folds):
+    for index, fold in enumerate(held):
         others = runs.of(np.setdiff1d(np.arange(len(runs)), fold))
         rng = np.random.default_rng([seed, index])
-        choice = choose(others, task, learners, folds=FOLDS, rng=rng)
+        choice = choose(others, task, learners, folds=folds, rng=rng)
         chosen.append(choice.name)
         losses["chosen"][fold] = 100.0 * stop_runs(choice.rule, runs.of(fold), task).loss
     return TraceLosses(losses, tuple(chosen))
 
 
-def losses_on(path: Path, seed: int) -> TraceLosses:
+def losses_on(path: Path, seed: int, folds: int = FOLDS) -> TraceLosses:
     """`cross_validate` on the traces of a file."""
-    return cross_validate(read_traces(path), seed)
+    return cross_validate(read_traces(path), seed, folds=folds)
 
 
 def trace_figures(sets: Mapping[str, TraceLosses]) -> tuple[Figures, dict[str, object]]:

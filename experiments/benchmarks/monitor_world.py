@@ -16,7 +16,8 @@ from experiments.hindsight import hindsight
 from experiments.racing import race
 from monitor.choosing import Chosen, tuned_division
 from monitor.missions import Value
-from monitor.robots.briefing import Briefing, brief
+from monitor.robots.briefing import QUICK as BRIEF
+from monitor.robots.briefing import Briefing, Effort, brief
 from monitor.robots.grid_missions import GridMission, read_mission
 
 Floats = NDArray[np.float64]
@@ -34,7 +35,7 @@ class Size:
     """missions: of each policy in a cell. further: of the product's policy alone, to hold its
     promise against. pairs: of start and goal in the cell of many. raced: whether the fixed division
     is raced, besides being tuned on the missions of calibration. hindsight: seeds for which it is
-    searched, each with so many candidates."""
+    searched, each with so many candidates. effort: of a briefing, unless it is the usual one."""
 
     missions: int
     further: int
@@ -42,10 +43,11 @@ class Size:
     raced: bool
     hindsight: int
     candidates: int = 300
+    effort: Effort | None = None
 
 
 STANDARD = Size(missions=200, further=300, pairs=5, raced=True, hindsight=3)
-QUICK = Size(missions=30, further=0, pairs=1, raced=False, hindsight=0)
+QUICK = Size(missions=30, further=0, pairs=1, raced=False, hindsight=0, effort=BRIEF)
 CELLS = [(value.kind, many) for many in (False, True) for value in VALUES]
 
 
@@ -82,7 +84,9 @@ def _live(grid: GridMission, seed: int, pairs: int, size: Size) -> Cell:
     each, further = -(-size.missions // pairs), -(-size.further // pairs)
     first = seed * (each + further)
     seeds = range(first, first + each)
-    briefing = _with_fixed(brief(grid, shipped.profiles()), raced=size.raced and pairs == 1)
+    briefing = _with_fixed(
+        brief(grid, shipped.profiles(), size.effort), raced=size.raced and pairs == 1
+    )
     optimal = briefing.monitor("optimal")
     assert isinstance(optimal.policy, Chosen)
     monitors = {"optimal": optimal, "paper": briefing.monitor("paper")}

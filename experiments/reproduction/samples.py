@@ -14,7 +14,7 @@ import numpy as np
 
 from compiler.elimination import warm_up
 from experiments import crossings
-from experiments.benchmarks import campaign, deadline, faults, monitor, planner, query
+from experiments.benchmarks import campaign, deadline, faults, monitor, planner, query_rivals
 from experiments.benchmarks.compiler_engine import races as compiler_races
 from experiments.benchmarks.figures import Figures
 from experiments.benchmarks.monitor_kinds import kinds
@@ -68,12 +68,12 @@ def _monitor(seed: int, settings: dict[str, Any]) -> Figures:
 
 
 def _query(seed: int, settings: dict[str, Any]) -> Figures:
-    figures = query.speeds(7, settings["not_measured"], settings)
+    figures = query_rivals.speeds(7, settings["not_measured"], settings)
     rivals = {name: rival for name, rival in installed().items() if name in _SEARCHES}
     if not rivals:
         settings["not_measured"]["vs_best_peer.nao"] = "no package to compare with is installed"
         return figures | {"vs_best_peer.nao": None}
-    return figures | query.peers(rivals, range(seed, seed + 4), 1.0, settings)
+    return figures | query_rivals.peers(rivals, range(seed, seed + 4), 1.0, settings)
 
 
 def _faults(seed: int, settings: dict[str, Any]) -> Figures:
