@@ -11,7 +11,7 @@ import numpy as np
 from compiler.elimination import Factor, Floats, Levels
 from compiler.solving import CELLS, Solution, cheapest
 
-TRIED = 256  # divisions that the floor is the best of, about
+WALKED = 256  # ways to levels of the result that are walked back for their divisions
 
 
 @dataclass(frozen=True)
@@ -74,23 +74,32 @@ def bracketed(
     upper = cheapest(ceilings, output.label, cells)
     lower = cheapest(floors, output.label, cells)
     necessary = np.minimum.accumulate(upper.bound[::-1])[::-1]  # for this level or a better one
-    # Any division is one that may be made. Those that the ceiling hopes for are the best where
-    # qualities rise gradually; those of the floor are sure to be any good where they jump.
-    shares = np.concatenate(
-        [_divisions(upper, ceilings, TRIED), _divisions(lower, floors, TRIED // 4)]
-    )
-    totals = shares.sum(axis=1)
-    budgets = np.unique(np.concatenate([totals, necessary[np.isfinite(necessary)]]))
-    by_total = np.argsort(totals)
-    best = by_total[best_so_far(qualities(responses, shares)[by_total])]
-    divisions = shares[best[np.searchsorted(totals[by_total], budgets, side="right") - 1]]
-    # What is left of the budget goes to the call that delivers the result.
-    spent = divisions[:, -1] + (budgets - divisions.sum(axis=1)) * (1 + 1e-12)
-    divisions[:, -1] = output.times[np.searchsorted(output.times, spent, side="right") - 1]
-    delivered = qualities(responses, divisions)
-    best = best_so_far(delivered)
+    # Any division is one that may be made. Between those that the ceiling hopes for lie the best
+    # where qualities rise gradually; those of the floor are sure to be any good where they jump.
+    hoped, sure = _divisions(upper, ceilings, WALKED), _divisions(lower, floors, WALKED // 4)
+    ends = [hoped.sum(axis=1), sure.sum(axis=1)]
+    budgets = np.unique(np.concatenate([*ends, necessary[np.isfinite(necessary)]]))
+    shares = np.concatenate([sure, _between(responses, hoped, budgets)])
+    totals = np.concatenate([ends[1], budgets])
+    order = np.argsort(totals, kind="stable")
+    delivered = qualities(responses, shares)[order]
+    best = best_so_far(delivered)[np.searchsorted(totals[order], budgets, side="right") - 1]
     ceiling = output.levels[np.searchsorted(necessary, budgets, side="right") - 1]
-    return Certificate(budgets, delivered[best], ceiling, divisions[best])
+    return Certificate(budgets, delivered[best], ceiling, shares[order[best]])
+
+
+def _between(responses: Sequence[Response], known: Floats, budgets: Floats) -> Floats:
+    """Divisions of budgets between known ones, [B, n]: at times that there are, and what is left
+    goes to the call that delivers the result."""
+    known = known[np.argsort(known.sum(axis=1), kind="stable")]
+    totals, shares = known.sum(axis=1), np.zeros((len(budgets), len(responses)))
+    for call, response in enumerate(responses):
+        seconds = np.interp(budgets, totals, known[:, call])
+        if call == len(responses) - 1:
+            seconds = budgets - shares.sum(axis=1)
+        seconds = seconds + 1e-12 * budgets  # what is a time but for rounding is that time
+        shares[:, call] = response.times[np.searchsorted(response.times, seconds, "right") - 1]
+    return shares
 
 
 def best_so_far(values: Floats) -> Levels:
@@ -100,11 +109,12 @@ def best_so_far(values: Floats) -> Levels:
     )
 
 
-def _divisions(solution: Solution, factors: Sequence[Factor], count: int) -> Floats:
+def _divisions(solution: Solution, factors: Sequence[Factor], most: int) -> Floats:
     """Seconds of each call on the ways to levels of the output that are reached, [K, n]: to all, or
-    to `count` of them evenly where there are more."""
+    to `most` of them evenly where there are more."""
     reached = np.flatnonzero(np.isfinite(solution.seconds))
-    some = np.unique(np.linspace(0, len(reached) - 1, min(count, len(reached))).round().astype(int))
+    count = min(most, len(reached))
+    some = np.unique(np.linspace(0, len(reached) - 1, count).round().astype(int))
     levels = solution.levels(reached[some])
     return np.array([f.table[tuple([levels[name] for name in f.scope])] for f in factors]).T
 

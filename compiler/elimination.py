@@ -97,6 +97,13 @@ def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> 
     levels = dict(chosen)
     count = max((len(each) for each in levels.values()), default=1)
     for step, bucket in [(s, b) for s in reversed(steps) for b in reversed(s.order.buckets)]:
+        if _least_places is not None and bucket.blocks is not None:
+            one, other = (step.tables[number] for number in bucket.members)
+            places = np.zeros(count, np.intp)
+            for name, size in zip(bucket.scope, bucket.shape[1:], strict=True):
+                places = places * size + levels[name]
+            levels[bucket.variable] = _least_places(one, other.reshape(bucket.blocks), places)
+            continue
         costs: Floats | None = None
         for number in bucket.members:
             scope = step.order.scopes[number]
@@ -114,13 +121,15 @@ def warm_up() -> None:
     It pays for who compiles often, not for one compilation: numba takes longer to load than a
     program to be compiled.
     """
-    global _least_sums
+    global _least_sums, _least_places
     from compiler import kernels
 
     _least_sums = cast(Callable[[Floats, Floats], Floats], kernels.least_sums)
+    _least_places = cast(Callable[[Floats, Floats, Levels], Levels], kernels.least_places)
 
 
 _least_sums: Callable[[Floats, Floats], Floats] | None = None
+_least_places: Callable[[Floats, Floats, Levels], Levels] | None = None
 
 
 def _aligned(table: Floats, scope: tuple[str, ...], names: tuple[str, ...]) -> Floats:

@@ -215,11 +215,11 @@ def _beyond(rng: np.random.Generator, count: int, settings: dict[str, object]) -
 
 
 def _certificates(rng: np.random.Generator, count: int) -> Figures:
-    """Chains of five real-valued modules, 400 steps: 256 levels of what is passed on, more towards
+    """Chains of five real-valued modules, 400 steps: 288 levels of what is passed on, more towards
     the result, whose rounding counts whole and whose levels cost little; tables built."""
     errors, spent, built = [], [], []
     for _ in range(count):
-        responses = real_chain(rng, [256, 256, 256, 320, 768])
+        responses = real_chain(rng, [288, 288, 288, 352, 768])
         started = time.process_time()
         floors = [floor_factor(response) for response in responses]
         ceilings = [ceiling_factor(response) for response in responses]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from compiler import elimination, solving
 from compiler.climbing import climbed, cost_of
-from compiler.elimination import MIN_PLUS, SUM_PRODUCT, Factor, eliminate
+from compiler.elimination import MIN_PLUS, SUM_PRODUCT, Factor, all_cheapest_levels, eliminate
 from compiler.relaxation import Relaxation
 from compiler.solving import Solution, cheapest
 
@@ -129,15 +129,23 @@ def test_the_gap_is_the_worst_over_budgets():
 
 @given(programs())
 @settings(deadline=None)
-def test_machine_code_gives_the_same_bits(program):
+def test_machine_code_gives_the_same_bits_and_walks_the_same_ways(program):
     factors, output = program
+
+    def found(semiring):
+        costs, steps = eliminate(factors, (output,), semiring)
+        return costs.table, all_cheapest_levels(steps, {output: np.arange(len(costs.table))})
+
     for semiring in (MIN_PLUS, SUM_PRODUCT):
-        plain = eliminate(factors, (output,), semiring)[0].table
+        plain, ways = found(semiring)
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(elimination, "_least_sums", None)
+            patched.setattr(elimination, "_least_places", None)
             elimination.warm_up()
-            warm = eliminate(factors, (output,), semiring)[0].table
+            warm, warm_ways = found(semiring)
         assert np.array_equal(warm, plain, equal_nan=True)
+        if semiring is MIN_PLUS:
+            assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
 
 
 def test_large_tables_are_joined_in_pieces_with_the_same_result():
