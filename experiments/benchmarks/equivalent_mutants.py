@@ -63,6 +63,14 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
     },
     "anytime.profiles": {
         (
+            "by_problem[run.problem] = by_problem.get(run.problem, 0.0) + weight",
+            "Add → Sub",
+        ): "the sums are squared",
+        (
+            "ends = np.array([here.band(times * each, confidence, resamples) for each in speeds])",
+            "Mult → Div",
+        ): "the speeds are a number, its inverse and 1",
+        (
             "return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())",
             "1.0 → 2.0",
         ): _BELOW,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from anytime import AnytimeError, Profile
+from anytime import AnytimeError, Machine, Profile
 from anytime.profiles import Distribution, Recording
 
 qualities = st.floats(0, 1)
@@ -250,6 +250,11 @@ def test_given_interpolates_between_the_strata_of_each_problem(at):
     assert profile.effective_problems == pytest.approx(2)
 
 
+def test_on_a_machine_that_is_known_nothing_is_unsure_any_more():
+    here = Profile("see", (), (recording(values=[0.5]),), unsure=3.0)
+    assert here.on(Machine("m").with_rate("see", 1.0)).unsure == 1.0
+
+
 def test_given_does_not_reach_beyond_what_a_problem_was_run_on():
     runs_ = (
         recording("a", [0.3], inputs={"boxes": 0.4}),
@@ -425,8 +430,6 @@ def test_what_has_no_weight_is_no_quantile():
 
 @given(profiles(), st.floats(0.1, 10))
 def test_a_machine_twice_as_fast_gives_the_same_quality_in_half_the_time(profile, rate):
-    from anytime import Machine
-
     slow, fast = (
         profile.on(Machine(name).with_rate("see", each))
         for name, each in (("slow", 2 * rate), ("fast", rate))

@@ -97,3 +97,12 @@ def test_times_to_levels_are_the_first_at_which_exactly_that_level_is_there(rows
         for level in range(4):
             first = times[levels.index(level)] if level in levels else np.inf
             assert table[row, level] == first
+
+
+def test_times_to_levels_are_found_for_every_combination_of_inputs():
+    quality = np.random.default_rng(0).integers(0, 4, size=(2, 3, 5))
+    times = np.arange(5.0)
+    table = times_to_levels(quality, times, 4)
+    assert table.shape == (2, 3, 4)
+    for row in range(2):
+        assert np.array_equal(table[row], times_to_levels(quality[row], times, 4))
