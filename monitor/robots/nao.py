@@ -18,11 +18,12 @@ from monitor.robots.nao_odometry import FROZEN, Odometry
 from monitor.robots.nao_planning import Errand, Planning, new_query
 from monitor.robots.nao_scenes import Goal
 from monitor.robots.nao_story import Story
+from monitor.robots.nao_touched import Touched
 from monitor.states import Situation
-from planners import nao_plan
 from planners.nao import POSTURES, STAND, STANDING, Body
 from planners.nao_plan import (
     MOST_OBSTACLES,
+    Action,
     actions_of,
     made_before,
     plan_world,
@@ -52,10 +53,7 @@ class Manner:
 
 
 _DANGER = 0.2  # metres by which a plan is worse that leads into something
-_TOUCHED_RADIUS = 0.1  # metres, of something that it fell over
-_TOUCHED_FOR = 45.0  # seconds for which that is believed to be there
 _WORTH = 0.01  # metres by which a plan must be better than to do nothing
-_FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
 _TRIES = 3  # walks that odometry does not see, one after the other, before the body is lost
 
 NOTHING = {("more", 0): False}
@@ -99,7 +97,7 @@ class NaoRobot:
         self._hopeful = self._since  # when a plan last brought it nearer
         self._execution: Execution | None = None
         self._posture = "Crouch"  # the last one that had a name
-        self._touched: list[tuple[float, float, float]] = []  # x, y, until when it is believed
+        self._touched = Touched()
         self.hearing = Hearing(self, sonars or Sonars())
         self.query = new_query(self._world(self.hearing.known), seed, self.planning)
         self._tries = 0  # walks broken off since the pose last changed
@@ -274,7 +272,7 @@ class NaoRobot:
         elif now - self._hopeful <= self.manner.patience or self.reading.fallen:
             return
         elif self._touched:  # before it gives up it doubts what it touched: that may have gone
-            self._touched.clear()
+            self._touched.doubt()
             self._hopeful = now
         else:
             self._ending = Ending.REACHED if self._near() else Ending.BLOCKED
@@ -287,17 +285,11 @@ class NaoRobot:
         self._story.happened(self._elapsed(), "fell")
         action = self._execution.current if self._execution else None
         if action is not None and action.name == "walk":
-            self._touched.append((*self._ahead(action), self.clock.now() + _TOUCHED_FOR))
+            pose, radius = self.reading.pose_in_world, self.figures.radius
+            self._touched.fell(pose, action, radius, self.clock.now())
         self._drop()
         if self.falls > self.manner.falls or self._decided:
             self._ending = Ending.FALLEN
-
-    def _ahead(self, walk: nao_plan.Action) -> tuple[float, float]:
-        """The middle of what a walk ran into, in world: sonars are deaf to what is that near."""
-        x, y, heading = self.reading.pose_in_world
-        towards = heading + math.atan2(walk.left, walk.ahead)
-        apart = self.figures.radius + _TOUCHED_RADIUS
-        return x + apart * math.cos(towards), y + apart * math.sin(towards)
 
     def _start(self, plan: Solution) -> None:
         """Execute a plan from the current moment on: what is executed is skipped, the action that
@@ -350,7 +342,7 @@ class NaoRobot:
         self._execution = None
         self.query.constrain({})
 
-    def _rises(self, action: nao_plan.Action) -> bool:
+    def _rises(self, action: Action) -> bool:
         return (
             action.name == "posture"
             and int(action.ahead) in STANDING
@@ -371,8 +363,7 @@ class NaoRobot:
         action = execution.current if execution else None
         grown = self.figures.radius + margin
         now = self.clock.now()
-        touched = [(x, y, _TOUCHED_RADIUS) for x, y, until in self._touched if now < until]
-        near = [*touched, *obstacles(heard).tolist()][:MOST_OBSTACLES]
+        near = [*self._touched.discs(now), *obstacles(heard).tolist()][:MOST_OBSTACLES]
         discs = [(x, y, r + grown) for x, y, r in near]
         return plan_world(
             self._meeting_point(),
@@ -381,7 +372,7 @@ class NaoRobot:
             obstacles=discs,
             done=execution.done if execution else 0,
             current=action,
-            elapsed=self.clock.now() - execution.began if execution and action else 0.0,
+            elapsed=now - execution.began if execution and action else 0.0,
             drift=self.drift.mean,
             effort=self.planning.effort,
             collision=self.planning.collision,
@@ -390,16 +381,10 @@ class NaoRobot:
 
     def _meeting_point(self) -> tuple[float, float]:
         """Where the goal will be when the robot can be there."""
-        elapsed = self._elapsed()
-        if self.goal.velocity == (0.0, 0.0):
-            return self.goal.place(elapsed)
-        here, body = self.reading.pose_in_world[:2], self.figures
+        body = self.figures
         rising = float(body.posture_seconds[POSTURES.index(self._posture), STAND])
-        takes = 0.0
-        for _ in range(20):
-            way = math.dist(here, self.goal.place(elapsed + takes))
-            takes = min(_FARTHEST, rising + body.step_phase + way / body.speed)
-        return self.goal.place(elapsed + takes)
+        here, delay = self.reading.pose_in_world[:2], rising + body.step_phase
+        return self.goal.meeting_point(here, self._elapsed(), speed=body.speed, delay=delay)
 
     def apart(self) -> float:
         """Metres to the goal, by odometry."""

@@ -17,6 +17,8 @@ from monitor.robots.nao_world import Obstacle, Vector
 from planners.nao import POSTURES, Body
 from sensing.sonar import Sonars
 
+_FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -28,6 +30,17 @@ class Goal:
     def place(self, time: float) -> Vector:
         """Where it is after `time` seconds."""
         return self.at[0] + self.velocity[0] * time, self.at[1] + self.velocity[1] * time
+
+    def meeting_point(self, here: Vector, time: float, *, speed: float, delay: float) -> Vector:
+        """Where it will be when one who is `here` after `time` seconds, and walks at `speed` (m/s)
+        after a `delay` (s), can be there; one who is too slow for it looks a minute ahead."""
+        if self.velocity == (0.0, 0.0):
+            return self.place(time)
+        takes = 0.0
+        for _ in range(20):
+            way = math.dist(here, self.place(time + takes))
+            takes = min(_FARTHEST, delay + way / speed)
+        return self.place(time + takes)
 
 
 @dataclass(frozen=True)

@@ -55,6 +55,22 @@ def test_the_first_figure_of_the_paper_is_read():
     assert scene.sonars.half_angle == pytest.approx(math.pi / 6)
 
 
+@given(
+    st.tuples(*[st.floats(-3, 3)] * 2), st.tuples(*[st.floats(-0.03, 0.03)] * 2), st.floats(0, 9)
+)
+def test_a_goal_is_met_where_it_will_be_when_one_can_be_there(at, velocity, delay):
+    goal, speed = Goal(at, velocity), 0.1
+    x, y = goal.meeting_point((0.0, 0.0), 2.0, speed=speed, delay=delay)
+    takes = delay + math.dist((0.0, 0.0), (x, y)) / speed
+    if takes < 60.0:
+        assert (x, y) == pytest.approx(goal.place(2.0 + takes), abs=1e-3)
+
+
+def test_a_goal_that_is_too_fast_to_be_met_is_followed_a_minute_ahead():
+    goal = Goal((1.0, 0.0), (1.0, 0.0))
+    assert goal.meeting_point((0.0, 0.0), 2.0, speed=0.1, delay=1.0) == goal.place(62.0)
+
+
 def test_a_moving_goal_moves():
     nao = SimulatedNao(read_scene(SCENES / "moving_target.toml"))
     nao.wait(6.0)
