@@ -63,6 +63,7 @@ def measure(
     _put_paper(figures, 200 if full else _COUNT if quick else 60, 5 if quick else 11, seed, rng)
     folder, per_map = maps or map_folder(), 10 if quick else 60 if full else 20
     raced = _race_all(quick, folder, per_map, seed, progress)
+    against_time: dict[str, list[Track]] = {}
     for key, found in raced.items():
         if not found:
             continue
@@ -70,7 +71,10 @@ def measure(
             tracks = [each.tracks["atp"] for each in found]
             figures |= share_figures(f"{key}.work_{name}", tracks, level)
         progress(f"{key}: time beside A*")
-        figures |= times(key, found, 1 if quick else 3)
+        against_time[key] = timed_all(found, 1 if quick else 3)
+        figures |= times(key, against_time[key])
+        if key == "maps":
+            figures |= share_figures("maps.time_kept_q97", timed_kept(found, 1 if quick else 3), 0.97)
     figures["maps.count"] = len(raced["maps"])
     _put_completion(figures, raced)
     figures |= against(raced)
@@ -109,7 +113,13 @@ def measure(
         "connectivity": 8,
         "not_measured": missing,
     }
-    return Benchmark("planner", figures, settings, seed, picture=lambda path: draw(raced, path))
+    return Benchmark(
+        "planner",
+        figures,
+        settings,
+        seed,
+        picture=lambda path: draw(raced, against_time, path),
+    )
 
 
 def _unmeasured(key: str, raced: dict[str, list[Race]], folder: Path | None) -> str:
@@ -169,22 +179,27 @@ def _race_all(
     return found
 
 
-def times(key: str, found: Sequence[Race], repeats: int) -> Figures:
-    """Shares of A*'s time at which the mean quality reaches .97 and .99; on maps also with what
-    earlier queries on the same map have found out."""
-    figures: Figures = {}
+def timed_all(found: Sequence[Race], repeats: int) -> list[Track]:
+    """ATP's tracks against time, in shares of our A*'s, nothing being known of the maps before."""
     timed(found[0], repeats=1)  # loads machine code, which the races did in other processes
-    tracks = [timed(each, repeats=repeats) for each in found]
+    return [timed(each, repeats=repeats) for each in found]
+
+
+def timed_kept(found: Sequence[Race], repeats: int) -> list[Track]:
+    """The same with what earlier queries on the same map have found out."""
+    grids: dict[Path | None, Grid] = {}
+    for each in found:
+        if each.problem.map not in grids:
+            grids[each.problem.map] = Grid.known(each.problem.load()[0])
+        timed(each, repeats=1, grid=grids[each.problem.map])
+    return [timed(each, repeats=repeats, grid=grids[each.problem.map]) for each in found]
+
+
+def times(key: str, tracks: Sequence[Track]) -> Figures:
+    """Shares of A*'s time at which the mean quality reaches .97 and .99."""
+    figures: Figures = {}
     for level, name in ((0.97, "q97"), (0.99, "q99")):
         figures |= share_figures(f"{key}.time_{name}", tracks, level)
-    if key == "maps":
-        grids: dict[Path | None, Grid] = {}
-        for each in found:
-            if each.problem.map not in grids:
-                grids[each.problem.map] = Grid.known(each.problem.load()[0])
-            timed(each, repeats=1, grid=grids[each.problem.map])
-        kept = [timed(each, repeats=repeats, grid=grids[each.problem.map]) for each in found]
-        figures |= share_figures("maps.time_kept_q97", kept, 0.97)
     return figures
 
 

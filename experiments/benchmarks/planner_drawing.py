@@ -1,4 +1,4 @@
-"""The picture of the planner's benchmark: quality against work, planner beside planner."""
+"""The picture of the planner's benchmark: quality against work and time, planner by planner."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.benchmarks.planner_races import Race, curve
+from experiments.benchmarks.planner_races import Race, Track, curve, mean_quality
 
 _SHARES = np.geomspace(0.005, 1.5, 200)
 _STYLES = {
@@ -19,9 +19,11 @@ _STYLES = {
 }
 
 
-def draw(raced: Mapping[str, Sequence[Race]], path: Path) -> Path:
-    """Draw the mean quality of the best plan so far against the share of A*'s work, family by
-    family, into a PNG; returns its path."""
+def draw(
+    raced: Mapping[str, Sequence[Race]], against_time: Mapping[str, Sequence[Track]], path: Path
+) -> Path:
+    """Draw the mean quality of the best plan so far against the share of A*'s work, and ATP's
+    against that of its time, family by family, into a PNG; returns its path."""
     from matplotlib.figure import Figure
 
     drawn = {key: found for key, found in raced.items() if found}
@@ -35,6 +37,11 @@ def draw(raced: Mapping[str, Sequence[Race]], path: Path) -> Path:
                 continue
             quality = curve(found, name, _SHARES)
             axis.plot(_SHARES, quality, color=colour, linestyle=style, linewidth=width, label=label)
+        if key in against_time:
+            tracks = against_time[key]
+            end = max((track[-1][0] for track in tracks if track), default=0.0)
+            quality = mean_quality(tracks, _SHARES[_SHARES <= end])  # where timing ended
+            axis.plot(_SHARES[_SHARES <= end], quality, color="#222222", linewidth=0.9, label="ATP, of A*'s time")
         axis.set_title(f"{key} ({len(found)})", fontsize=10)
         axis.set_xscale("log")
         axis.set_xlim(0.005, 1.5)
@@ -44,7 +51,7 @@ def draw(raced: Mapping[str, Sequence[Race]], path: Path) -> Path:
     for axis in axes[len(drawn) :]:
         axis.set_visible(False)
     axes[0].legend(fontsize=8, loc="lower right")
-    figure.supxlabel("share of A*'s expansions")
+    figure.supxlabel("share of A*'s expansions; thin black: of its time")
     figure.supylabel("mean quality of the best plan so far")
     figure.savefig(path, dpi=110)
     return path

@@ -119,7 +119,7 @@ def races(
 
 def curve(found: Sequence[Race], name: str, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Mean quality of the best plan so far at each share of A*'s work; no plan counts 0."""
-    return _mean([each.tracks[name] for each in found], shares)
+    return mean_quality([each.tracks[name] for each in found], shares)
 
 
 def share_at(tracks: Sequence[Track], level: float) -> float | None:
@@ -148,7 +148,8 @@ def resampled(count: int) -> NDArray[np.float64]:
     return np.stack([np.bincount(row, minlength=count) for row in drawn]) / count
 
 
-def _mean(tracks: Sequence[Track], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def mean_quality(tracks: Sequence[Track], shares: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same of tracks, whatever they are against."""
     return _qualities(tracks, shares).sum(axis=0) / max(1, len(tracks))
 
 

@@ -74,6 +74,12 @@ class Floors:
 PERFECT, IMPERFECT = Floors(), Floors(vision=VISION)
 
 
+def median_floor(seed: int, count: int) -> int:
+    """The index of the floor whose first plan is the median of so many, in the paper's way."""
+    indices = range(seed, seed + count)
+    return sorted(indices, key=lambda index: float(course(index, PAPER).quality[0]))[count // 2]
+
+
 @lru_cache(maxsize=128)
 def course(index: int, way: Way, floors: Floors = PERFECT) -> Course:
     """Plan across the index-th floor, one refinement a step in the paper's way."""

@@ -9,6 +9,7 @@ from functools import lru_cache
 from experiments.benchmarks.nao import START
 from experiments.benchmarks.nao_worlds import briefing
 from experiments.reproduction.ways import Way
+from monitor.reports import Report
 from monitor.robots.nao import NaoRobot
 from monitor.robots.nao_drift import Drift
 from monitor.robots.nao_scenes import Goal, Scene
@@ -33,13 +34,17 @@ def second_run(seed: int) -> Scene:
 
 
 @lru_cache(maxsize=2)  # one seed, both ways
-def lived(seed: int, way: Way) -> NaoRobot:
-    """The robot at the end of its mission. Who does not learn, believes in no drift for ever."""
+def lived(seed: int, way: Way) -> tuple[NaoRobot, Report]:
+    """The robot at the end of the second run, and how that went."""
+    return live(second_run(seed), way)
+
+
+def live(scene: Scene, way: Way) -> tuple[NaoRobot, Report]:
+    """Live a mission. Who does not learn, believes in no drift for ever."""
     able = replace(briefing(), planning=way.planning)
     drift = Drift() if way.learns else Drift(variance=0.0)
-    robot = able.robot(second_run(seed), drift=drift)
-    able.live(robot, seed)
-    return robot
+    robot = able.robot(scene, drift=drift)
+    return robot, able.live(robot, scene.seed)
 
 
 # --- The claims, one draw each.
@@ -47,10 +52,11 @@ def lived(seed: int, way: Way) -> NaoRobot:
 
 def switch_above_threshold(seed: int, way: Way) -> bool:
     """It switches to another plan, and only to such as are better by the threshold."""
-    robot = lived(seed, way)
+    robot, _ = lived(seed, way)
     return bool(robot.gains) and min(robot.gains) > robot.manner.threshold
 
 
 def replanned_final(seed: int, way: Way) -> tuple[float, ...]:
     """Metres from the goal in the end, by odometry, however the mission ended."""
-    return (math.dist(lived(seed, way).reading.pose_in_world[:2], GOAL),)
+    robot, _ = lived(seed, way)
+    return (math.dist(robot.reading.pose_in_world[:2], GOAL),)

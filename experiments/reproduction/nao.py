@@ -5,13 +5,14 @@ from __future__ import annotations
 from experiments.reproduction import executions, searches
 from experiments.reproduction.claims import Claim, Value, behaviour
 from experiments.reproduction.collisions import collision_on_crossing
-from experiments.reproduction.drawing import draw
 from experiments.reproduction.executions import (
     objective_after_stand,
     obstacle_step,
     skip_executed,
 )
 from experiments.reproduction.missions import replanned_final, switch_above_threshold
+from experiments.reproduction.nao_animations import animate
+from experiments.reproduction.nao_drawing import draw
 from experiments.reproduction.searches import (
     any_length,
     appeared_most_cases,
@@ -28,7 +29,7 @@ from experiments.reproduction.searches import (
 )
 from experiments.reproduction.sweeps import Sweep
 
-__all__ = ["CLAIMS", "draw", "settings", "sweeps"]
+__all__ = ["CLAIMS", "animate", "draw", "settings", "sweeps"]
 
 CLAIMS: tuple[Claim, ...] = (
     behaviour("prp.toy", "the query finds how many normal variables, and which, add up to 5", toy),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +41,15 @@ figure { margin: 1.5rem 0; } figure svg { max-width: 100%; height: auto; }
 .sweep { font-size: .85rem; } .sweep th, .sweep td { padding: .25rem .4rem; }
 figure.broad svg { min-width: 38rem; }
 figcaption { font-size: .9rem; color: #444; max-width: 50rem; }
+.animations { display: grid; gap: 0 1.5rem;
+  grid-template-columns: repeat(auto-fill, minmax(min(22rem, 100%), 1fr)); }
+.animation h4 { margin: 0 0 .4rem; font-size: .95rem; }
+.animation canvas { display: block; width: 100%; }
+.controls { display: flex; gap: .6rem; align-items: center; margin: .4rem 0 0; }
+.controls button { width: 2.4rem; font-size: .9rem; } .controls input { flex: 1; min-width: 4rem; }
+.animation output { display: block; font-size: .85rem; min-height: 1.5em; }
+.key { font-size: .85rem; color: #444; display: flex; flex-wrap: wrap; gap: 0 1rem; }
+.key svg { vertical-align: middle; margin-right: .3rem; }
 pre { background: #f4f4f4; padding: .5rem .8rem; overflow-x: auto; }
 ul.cut { font-size: .9rem; color: #444; padding-left: 1.2rem; }
 @media (max-width: 40rem) {
@@ -57,7 +68,7 @@ _BROAD = 500  # points of width beyond which a picture is not shrunk to a narrow
 
 def page(told: Mapping[str, Any], folder: Path) -> str:
     """The page as HTML. told: what `anytime reproduce --json` prints; folder: where its pictures
-    lie, which become part of the page."""
+    and animations lie, which become part of the page."""
     settings = told["settings"]
     machine = f"Python {told['machine']['python']}, {told['machine']['system']}"
     parts = [
@@ -81,8 +92,12 @@ def page(told: Mapping[str, Any], folder: Path) -> str:
         for picture in settings["pictures"]:
             if PART[picture["part"]] == paper:
                 parts.append(_figure(folder / picture["file"], picture["caption"]))
+        parts.append(_animations(settings["animations"], paper, folder))
         if paper == "zr":
             parts += [_sweep(sweep) for sweep in settings["sweeps"]]
+    if settings["animations"]:
+        code = (files("experiments.reproduction") / "player.js").read_text(encoding="utf-8")
+        parts.append(f"<script>{code}</script>")
     if settings["comparisons"]:
         parts.append(f"<h2>{escape(BEYOND)}</h2><p>{escape(READ)}")
         parts.append(f"<pre>{_command(RIVALS, told)}</pre>")
@@ -146,4 +161,34 @@ def _figure(file: Path, caption: str) -> str:
     return (
         f'<figure{broad}><div class="wide">{svg}</div><figcaption>{escape(caption)}</figcaption>'
         "</figure>"
+    )
+
+
+def _animations(listed: Sequence[Mapping[str, Any]], paper: str, folder: Path) -> str:
+    drawn = [
+        _animation(folder / each["file"], each["caption"])
+        for each in listed
+        if PART[each["part"]] == paper
+    ]
+    return f'<div class="animations">{"".join(drawn)}</div>' if drawn else ""
+
+
+def _animation(file: Path, caption: str) -> str:
+    """A canvas with its data, which `player.js` plays."""
+    # In a script element `<` alone can end or nest it.
+    data = file.read_text(encoding="utf-8").replace("<", "\\u003c")
+    told = json.loads(data)
+    key = "".join(
+        f'<span><svg width="26" height="8" aria-hidden="true"><path d="M0 4H26" '
+        f'stroke="{line["colour"]}" stroke-width="2" '
+        f'stroke-dasharray="{" ".join(map(str, line["dash"]))}"/></svg>'
+        f"{escape(line['label'])}</span>"
+        for line in told["lines"]
+    )
+    return (
+        f'<figure class="animation"><script type="application/json">{data}</script>'
+        f'<h4>{escape(told["title"])}</h4><canvas role="img"></canvas>'
+        '<div class="controls"><button type="button" aria-label="play">▶</button>'
+        '<input type="range" min="0" value="0" aria-label="moment"></div><output></output>'
+        f'<div class="key">{key}</div><figcaption>{escape(caption)}</figcaption></figure>'
     )

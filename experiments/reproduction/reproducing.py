@@ -12,6 +12,7 @@ from typing import Any
 
 from experiments.benchmarks.figures import Benchmark
 from experiments.reproduction import rivals
+from experiments.reproduction.animations import Animated
 from experiments.reproduction.claims import Claim, Verdict
 from experiments.reproduction.draws import drawn, known, verdicts
 from experiments.reproduction.keeping import FILE, opened
@@ -46,7 +47,7 @@ class Judged:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What `reproduce` found, and the pictures that it drew.
+    """What `reproduce` found, and the pictures and animations that it made.
 
     comparisons: rows of the table beyond the papers, as JSON.
     """
@@ -55,6 +56,7 @@ class Reproduction:
     comparisons: tuple[dict[str, Any], ...]
     benchmark: Benchmark
     pictures: tuple[Picture, ...]
+    animations: tuple[Animated, ...]
 
     def __repr__(self) -> str:
         lines: list[str] = []
@@ -83,9 +85,9 @@ def measure(
 ) -> Reproduction:
     """Measure the claims of the parts, each in the paper's way and in ours, and draw pictures.
 
-    parts: names of files here, which hold `CLAIMS` and `draw`. A draw of all claims is one seed;
-    the same seeds serve both ways. What is found is kept beside the page as it comes; resume: go on
-    from there, else it is removed.
+    parts: names of files here, which hold `CLAIMS`, `draw` and `animate`. A draw of all claims is
+    one seed; the same seeds serve both ways. What is found is kept beside the page as it comes;
+    resume: go on from there, else it is removed.
     """
     modules = {
         part: importlib.import_module(f"experiments.reproduction.{part}")
@@ -114,6 +116,9 @@ def measure(
     pictures = tuple(
         picture for module in modules.values() for picture in module.draw(output / FIGURES, seed)
     )
+    animations = tuple(
+        each for module in modules.values() for each in module.animate(output / FIGURES, seed)
+    )
     missing = dict(beside.not_measured)
     figures = _figures(judged, missing) | beside.figures
     settings = {
@@ -126,13 +131,15 @@ def measure(
         "claims": {each.claim.name: each.claim.text for each in judged},
         "sweeps": swept,
         "comparisons": list(beside.rows),
-        "pictures": [
-            {"part": each.part, "file": f"{FIGURES}/{each.file.name}", "caption": each.caption}
-            for each in pictures
-        ],
+        "pictures": list(map(_shown, pictures)),
+        "animations": list(map(_shown, animations)),
     }
     benchmark = Benchmark("reproduce", figures, settings, seed)
-    return Reproduction(tuple(judged), beside.rows, benchmark, pictures)
+    return Reproduction(tuple(judged), beside.rows, benchmark, pictures, animations)
+
+
+def _shown(each: Picture | Animated) -> dict[str, str]:
+    return {"part": each.part, "file": f"{FIGURES}/{each.file.name}", "caption": each.caption}
 
 
 def _swept(module: ModuleType, quick: bool) -> list[dict[str, object]]:

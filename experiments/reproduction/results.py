@@ -48,6 +48,10 @@ def results(told: Mapping[str, Any]) -> str:
         for picture in settings["pictures"]:
             if PART[picture["part"]] == paper:
                 lines += ["", f"![{picture['caption']}]({picture['file']})", "", picture["caption"]]
+        moving = [each for each in settings["animations"] if PART[each["part"]] == paper]
+        if moving:
+            lines += ["", "In motion on the page:", ""]
+            lines += [f"- {each['caption']}" for each in moving]
         if paper == "zr":
             for sweep in settings["sweeps"]:
                 lines += ["", f"### {sweep['title']}", ""]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -43,12 +43,32 @@ INITIAL = 0.06
 """What a plan to stand up and walk a metre costs, §4: the effort alone."""
 
 
+@dataclass(frozen=True)
+class Scene:
+    """What is around the robot while it searches: an obstacle half-way to its goal, from some
+    second of the search on until another; and by how many m/s its goal moves away from it."""
+
+    appears: float = 0.0
+    vanishes: float = math.inf
+    moves: float = 0.0
+
+
+BARE = Scene(appears=math.inf)
+AROUND = Scene()
+"""[PRP16] Fig. 1."""
+MOVING_GOAL = Scene(moves=MOVING)
+REMOVED_EARLY, REMOVED_LATE = Scene(vanishes=EARLY), Scene(vanishes=LATE)
+APPEARS = Scene(appears=EARLY)
+
+
 class Search:
     """A query for a plan of a robot that sits a metre from its goal, on the reference machine."""
 
-    def __init__(self, seed: int, way: Way, *, obstacle: bool) -> None:
+    def __init__(self, seed: int, way: Way, scene: Scene) -> None:
         planning = replace(way.planning, effort=effort())
-        self.query = new_query(world(planning, obstacle), seed, planning)
+        self.scene = scene
+        self.query = new_query(world(planning, scene.appears == 0.0), seed, planning)
+        self._surrounded = world(planning, True)
 
     @property
     def seconds(self) -> float:
@@ -57,8 +77,19 @@ class Search:
     def until(self, seconds: float) -> Search:
         """Search on until so many seconds have passed since it began."""
         while self.seconds < seconds:
-            self.query.step()
+            self.step()
         return self
+
+    def step(self) -> None:
+        """One generation more, in the world as it is now."""
+        now, scene, there = self.seconds, self.scene, self.query.world
+        if there["obstacle_count"] and now >= scene.vanishes:
+            there["obstacle_count"] = 0
+        if not there["obstacle_count"] and scene.appears <= now < scene.vanishes:
+            there.update(self._surrounded)
+        if scene.moves:
+            there["goal_x"] = GOAL[0] + scene.moves * now
+        self.query.step()
 
     def actions(self) -> tuple[Action, ...]:
         return actions_of(self.query.best.choices)
@@ -153,9 +184,9 @@ def toy(seed: int, way: Way) -> bool:
 
 def any_length(seed: int, way: Way) -> bool:
     """The best plans so far had different numbers of actions, and the last one arrives."""
-    search, lengths = Search(seed, way, obstacle=True), set[int]()
+    search, lengths = Search(seed, way, AROUND), set[int]()
     while search.seconds < LATE:
-        search.query.step()
+        search.step()
         lengths.add(len(search.actions()))
     return len(lengths) > 1 and search.apart() <= ARRIVED
 
@@ -163,7 +194,7 @@ def any_length(seed: int, way: Way) -> bool:
 def stand_first(seed: int, way: Way) -> bool:
     """Without an obstacle, the first thing that changes where the robot is or how it stands is to
     stand up (while it sits, walks and turns change nothing), and it goes straight to the goal."""
-    search = Search(seed, way, obstacle=False).until(LATE)
+    search = Search(seed, way, BARE).until(LATE)
     states = [(pose.x, pose.y, pose.heading, pose.posture) for pose in search.poses()]
     changed = next((state for state in states if state != states[0]), states[0])
     rises = changed[:3] == states[0][:3] and changed[3] in STANDING
@@ -172,27 +203,23 @@ def stand_first(seed: int, way: Way) -> bool:
 
 def round_obstacle(seed: int, way: Way) -> tuple[float, ...]:
     """The plan goes round the obstacle to the goal; and by the shortest route."""
-    search = Search(seed, way, obstacle=True).until(LATE)
+    search = Search(seed, way, AROUND).until(LATE)
     goes_round = not search.collides() and search.apart() <= ARRIVED
     return float(goes_round), float(goes_round and search.length() <= SHORTEST * _shortest())
 
 
 def first_plan(seed: int, way: Way) -> tuple[float, ...]:
     """Seconds until an almost precise plan; what takes longer than 6 s counts as 6 s."""
-    search, nao = Search(seed, way, obstacle=True), body()
+    search, nao = Search(seed, way, AROUND), body()
     seconds = nao.posture_seconds[SIT, STAND] + _shortest() / nao.speed
     while search.query.value > effort() * seconds + CLOSE and search.seconds < 2 * LATE:
-        search.query.step()
+        search.step()
     return (search.seconds,)
 
 
 def moving_tracked(seed: int, way: Way) -> tuple[float, ...]:
     """Metres from where a moving goal is after 6 s at which the best plan of then ends."""
-    search = Search(seed, way, obstacle=True)
-    while search.seconds < 2 * LATE:
-        search.query.world["goal_x"] = GOAL[0] + MOVING * search.seconds
-        search.query.step()
-    return (search.apart(),)
+    return (Search(seed, way, MOVING_GOAL).until(2 * LATE).apart(),)
 
 
 def printed_moving_error() -> float:
@@ -203,25 +230,19 @@ def printed_moving_error() -> float:
 
 def removed_early_straight(seed: int, way: Way) -> bool:
     """The obstacle goes after .5 s; 3 s later the plan is straight."""
-    return _removed(seed, way, EARLY).straight()
+    return Search(seed, way, REMOVED_EARLY).until(EARLY + LATE).straight()
 
 
 def removed_late_stays(seed: int, way: Way) -> bool:
     """The obstacle goes after 3 s; 3 s later the plan still makes at least half of its detour."""
-    search = Search(seed, way, obstacle=True).until(LATE)
+    search = Search(seed, way, REMOVED_LATE).until(LATE)
     before = search.aside()
-    return _removed(seed, way, LATE).aside() >= 0.5 * before > 0.0
-
-
-def _removed(seed: int, way: Way, after: float) -> Search:
-    search = Search(seed, way, obstacle=True).until(after)
-    search.query.world["obstacle_count"] = 0
-    return search.until(after + LATE)
+    return search.until(2 * LATE).aside() >= 0.5 * before > 0.0
 
 
 def value_unchanged_by_removal(seed: int, way: Way) -> bool:
     """What the best plan is worth does not change when the obstacle goes."""
-    search = Search(seed, way, obstacle=True).until(LATE)
+    search = Search(seed, way, AROUND).until(LATE)
     best = search.query.best
     search.query.world["obstacle_count"] = 0
     return search.query.value_of(best.choices) == best.value
@@ -229,16 +250,14 @@ def value_unchanged_by_removal(seed: int, way: Way) -> bool:
 
 def appeared_most_cases(seed: int, way: Way) -> tuple[float, ...]:
     """An obstacle appears after .5 s; 3 s later the plan goes round it to the goal."""
-    search = Search(seed, way, obstacle=False).until(EARLY)
-    search.query.world.update(world(replace(way.planning, effort=effort()), True))
-    search.until(EARLY + LATE)
+    search = Search(seed, way, APPEARS).until(EARLY + LATE)
     return (float(not search.collides() and search.apart() <= ARRIVED),)
 
 
 def fall_stands_up(seed: int, way: Way) -> bool:
     """It falls on its way and crouches where no plan expected it: 3 s later the plan stands up and
     goes to the goal, without another collision."""
-    search = Search(seed, way, obstacle=True).until(EARLY)
+    search = Search(seed, way, AROUND).until(EARLY)
     search.query.world.update(x=0.3, y=0.25, heading=0.7, posture=CROUCH)
     search.until(EARLY + LATE)
     rises = any(a.name == "posture" and int(a.ahead) in STANDING for a in search.actions())

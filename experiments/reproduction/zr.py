@@ -24,9 +24,10 @@ from experiments.reproduction.dividing import (
 from experiments.reproduction.looking import vision_none_below_ta, vision_rises
 from experiments.reproduction.sweeps import sweeps
 from experiments.reproduction.tasks import ahead_behind, within_4
+from experiments.reproduction.zr_animations import animate
 from experiments.reproduction.zr_drawing import draw
 
-__all__ = ["CLAIMS", "draw", "settings", "sweeps"]
+__all__ = ["CLAIMS", "animate", "draw", "settings", "sweeps"]
 
 CLAIMS: tuple[Claim, ...] = (
     behaviour(

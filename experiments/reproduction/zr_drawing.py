@@ -16,6 +16,7 @@ from experiments.reproduction.abstraction import (
     SIZE,
     Course,
     course,
+    median_floor,
     mixed,
 )
 from experiments.reproduction.dividing import DOMAINS, SECONDS, VISION, divided
@@ -64,7 +65,7 @@ def _vision(folder: Path, seed: int) -> Picture:
 
 
 def _plans(folder: Path, seed: int) -> Picture:
-    index = _median_floor(seed)
+    index = median_floor(seed, _FLOORS)
     found = course(index, PAPER)
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
@@ -80,7 +81,7 @@ def _plans(folder: Path, seed: int) -> Picture:
 
 
 def _noisy_plans(folder: Path, seed: int) -> Picture:
-    found = course(_median_floor(seed), PAPER, IMPERFECT)
+    found = course(median_floor(seed, _FLOORS), PAPER, IMPERFECT)
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
     chosen = (0, place if place is not None else len(found.plans) - 1)
@@ -91,11 +92,6 @@ def _noisy_plans(folder: Path, seed: int) -> Picture:
         "the true floor, on which the robot walks."
     )
     return save(figure, folder, "zr", "fig6-noisy-plans", caption)
-
-
-def _median_floor(seed: int) -> int:
-    indices = range(seed, seed + _FLOORS)
-    return sorted(indices, key=lambda index: float(course(index, PAPER).quality[0]))[_FLOORS // 2]
 
 
 def _on_map(axes: Axes, found: Course, place: int, title: str) -> None:

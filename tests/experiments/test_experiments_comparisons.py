@@ -112,7 +112,7 @@ def told_of(rows):
         "figures": {"claims": {"total": 0, "held": 0}},
         "settings": {
             "quick": False, "cut": [], "claims": {},
-            "comparisons": rows, "pictures": [], "sweeps": [],
+            "comparisons": rows, "pictures": [], "animations": [], "sweeps": [],
         },
         "machine": {"python": "3", "system": "any"},
         "seed": 7,

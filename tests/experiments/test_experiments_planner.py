@@ -50,4 +50,6 @@ def test_time_is_told_for_plans_in_their_order(raced):
 
 
 def test_the_picture_is_drawn(raced, tmp_path):
-    assert draw({"some": raced, "none": []}, tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    against_time = {"some": [timed(each, repeats=1) for each in raced]}
+    drawn = draw({"some": raced, "none": []}, against_time, tmp_path / "a.png")
+    assert drawn.read_bytes().startswith(b"\x89PNG")

@@ -13,7 +13,14 @@ import numpy as np
 import pytest
 
 from anytime.__main__ import main
-from experiments.reproduction import executions, nao, reproducing, searches
+from experiments.reproduction import (
+    executions,
+    nao,
+    nao_animations,
+    nao_drawing,
+    reproducing,
+    searches,
+)
 from experiments.reproduction.claims import ENOUGH, Value, judge
 from experiments.reproduction.draws import drawn
 from experiments.reproduction.executions import AHEAD, execute, surprised
@@ -189,6 +196,11 @@ def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp
     monkeypatch.setattr(
         nao, "CLAIMS", few("prp.toy", "prp.obstacle_step", "prp.collision_on_crossing")
     )
+    monkeypatch.setattr(nao, "draw", lambda folder, seed: (nao_drawing.objective(folder, seed),))
+    around = nao_animations.SEARCHES[0]
+    monkeypatch.setattr(
+        nao, "animate", lambda folder, seed: (nao_animations.search(folder, seed, *around),)
+    )
     monkeypatch.setattr(reproducing, "QUICK_DRAWS", 2)
     words = ["reproduce", "nao", "--quick", "--json", "-o", str(tmp_path)]
     assert main(words) == 0
@@ -201,7 +213,9 @@ def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert json.loads((tmp_path / "results.json").read_text()) == told
     assert "prp" in (tmp_path / "results.md").read_text().lower()
-    assert "<svg" in (tmp_path / "reproduce.html").read_text()
+    page = (tmp_path / "reproduce.html").read_text()
+    assert "<svg" in page
+    assert "<canvas" in page
     kept = (tmp_path / FILE).read_bytes()
     (tmp_path / FILE).write_bytes(kept[:-10])  # of the last line, which says that nothing was swept
     monkeypatch.setattr(nao, "draw", lambda folder, seed: ())  # as before, and it takes seconds

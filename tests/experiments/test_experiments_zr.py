@@ -119,6 +119,7 @@ def told(folder) -> dict:
             "pictures": [
                 {"part": "zr", "file": f"figures/{picture.file.name}", "caption": picture.caption}
             ],
+            "animations": [],
             "sweeps": [
                 {
                     "title": "by size",

@@ -1,9 +1,11 @@
-"""The objective of a NAO's plan in execution as a picture. [PRP16] §4 and Fig. 2."""
+"""The pictures of [PRP16]: plans that are found, and what one is worth while it is executed."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from anytime.pictures import COLOURS
 from experiments.reproduction.executions import (
@@ -15,16 +17,69 @@ from experiments.reproduction.executions import (
     obstacle_step,
     surprised,
 )
-from experiments.reproduction.pictures import Picture, new_figure, save
-from experiments.reproduction.searches import INITIAL
+from experiments.reproduction.pictures import STYLES, Picture, new_figure, save
+from experiments.reproduction.searches import (
+    AROUND,
+    GOAL,
+    INITIAL,
+    LATE,
+    MOVING_GOAL,
+    REMOVED_EARLY,
+    REMOVED_LATE,
+    Search,
+    printed_disc,
+)
 from experiments.reproduction.ways import OURS, PAPER
 
 _DRAWS = 15
+_SEARCHES = 5
+_FOUND = (
+    (AROUND, "An obstacle"),
+    (MOVING_GOAL, "The goal moves, 10 cm/s"),
+    (REMOVED_EARLY, "It goes after 0.5 s"),
+    (REMOVED_LATE, "It goes after 3 s"),
+)
 
 
 def draw(folder: Path, seed: int) -> tuple[Picture, ...]:
-    """Draw what a plan in execution is worth: with the drift of standing up unknown and learnt, and
-    when an obstacle appears, by the paper's rule and by ours.
+    """Draw the plans of Fig. 1 and of the searches of §4, and the objective of Fig. 2."""
+    return plans(folder, seed), objective(folder, seed)
+
+
+def plans(folder: Path, seed: int) -> Picture:
+    """Where the best plans lead at the end of each search, in both ways."""
+    from matplotlib.patches import Circle
+
+    figure, panels = new_figure(11, 2.6, columns=len(_FOUND))
+    for axes, (scene, title) in zip(panels, _FOUND, strict=True):
+        for place, (way, label) in enumerate(((PAPER, "the paper's operators"), (OURS, "ours"))):
+            for draw in range(_SEARCHES):
+                search = Search(seed + draw, way, scene).until(2 * LATE)
+                poses = search.poses()
+                style: dict[str, Any] = {"color": COLOURS[place], "linestyle": STYLES[place]}
+                xs, ys = [pose.x for pose in poses], [pose.y for pose in poses]
+                axes.plot(xs, ys, linewidth=1.0, alpha=0.7, label="" if draw else label, **style)
+        x, y, radius = printed_disc()
+        gone = scene.vanishes < math.inf
+        disc = {"facecolor": "none" if gone else "0.75", "linestyle": ":" if gone else "-"}
+        axes.add_patch(Circle((x, y), radius, edgecolor="0.4", **disc))
+        goal = GOAL[0] + scene.moves * 2 * LATE
+        axes.plot(goal, 0.0, "P", color=COLOURS[2], markersize=8)
+        axes.set(title=title, xlabel="ahead [m]", ylim=(-0.6, 0.6), xlim=(-0.15, 1.8))
+        axes.set_aspect("equal")
+    panels[0].set_ylabel("aside [m]")
+    panels[0].legend(frameon=False, loc="lower center", fontsize=8)
+    caption = (
+        f"[PRP16] Fig. 1 and §4: where the best plan leads after {2 * LATE:g} s of search, "
+        f"{_SEARCHES} draws in each way. Cross: the goal; grey: an obstacle; dotted: one that has "
+        "gone. The robot sits at (0, 0)."
+    )
+    return save(figure, folder, "nao", "plans", caption)
+
+
+def objective(folder: Path, seed: int) -> Picture:
+    """What a plan in execution is worth: with the drift of standing up unknown and learnt, and when
+    an obstacle appears, by the paper's rule and by ours.
 
     Of a few draws, each that which is the median in the paper's way.
     """
@@ -62,7 +117,7 @@ def draw(folder: Path, seed: int) -> tuple[Picture, ...]:
         "[PRP16] §4 and Fig. 2, the objective of a plan in execution: standing up turns the robot, "
         f"and an obstacle appears. Of {_DRAWS} draws each, the one in the middle."
     )
-    return (save(figure, folder, "nao", "objective", caption),)
+    return save(figure, folder, "nao", "objective", caption)
 
 
 def _median(figure: Callable[[int], float], seed: int) -> int:
