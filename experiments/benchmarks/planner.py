@@ -71,10 +71,11 @@ def measure(
             tracks = [each.tracks["atp"] for each in found]
             figures |= share_figures(f"{key}.work_{name}", tracks, level)
         progress(f"{key}: time beside A*")
-        against_time[key] = timed_all(found, 1 if quick else 3)
+        repeats = 1 if quick else 3
+        against_time[key] = timed_all(found, repeats)
         figures |= times(key, against_time[key])
         if key == "maps":
-            figures |= share_figures("maps.time_kept_q97", timed_kept(found, 1 if quick else 3), 0.97)
+            figures |= share_figures("maps.time_kept_q97", timed_kept(found, repeats), 0.97)
     figures["maps.count"] = len(raced["maps"])
     _put_completion(figures, raced)
     figures |= against(raced)

@@ -40,8 +40,9 @@ def draw(
         if key in against_time:
             tracks = against_time[key]
             end = max((track[-1][0] for track in tracks if track), default=0.0)
-            quality = mean_quality(tracks, _SHARES[_SHARES <= end])  # where timing ended
-            axis.plot(_SHARES[_SHARES <= end], quality, color="#222222", linewidth=0.9, label="ATP, of A*'s time")
+            shares = _SHARES[: np.searchsorted(_SHARES, end)]  # there timing ended
+            quality = mean_quality(tracks, shares)
+            axis.plot(shares, quality, color="#222222", linewidth=0.9, label="ATP, of A*'s time")
         axis.set_title(f"{key} ({len(found)})", fontsize=10)
         axis.set_xscale("log")
         axis.set_xlim(0.005, 1.5)

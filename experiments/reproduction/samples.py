@@ -52,7 +52,7 @@ def _planner(seed: int, settings: dict[str, Any]) -> Figures:
     for key, found in raced.items():
         tracks = [each.tracks["atp"] for each in found]
         figures |= planner.share_figures(f"{key}.work_q97", tracks, 0.97)
-        figures |= planner.times(key, found, 3)
+        figures |= planner.times(key, planner.timed_all(found, 3))
     put_peers(figures, settings["not_measured"], seed, lambda message: None, _PEERS)
     return figures
 
