@@ -15,6 +15,7 @@ from anytime.clocks import WallClock
 from anytime.errors import AnytimeError
 from anytime.mail import ClosedError
 from anytime.results import Fault
+from anytime.worker_letters import BEGUN, DONE, GO, JOB, LEAVE, POST, POSTED, STOP, Job
 
 if TYPE_CHECKING:
     from anytime.mail import Letter
@@ -74,7 +75,7 @@ def perform(
     does. On a work clock the worker is told the time after each check-point, so that the run is
     that of this process bit for bit; one that makes no progress is charged its whole contract.
     """
-    from anytime.workers import workers
+    from anytime.workers import workers  # only who isolates pays for them
 
     real = isinstance(current.deadline.clock, WallClock)
     until = current.deadline.at if real else time.perf_counter() + HUNG
@@ -105,8 +106,6 @@ def _job(
     filled: dict[str, Any],
     told: float | None,
 ) -> bytes:
-    from anytime.worker_process import Job
-
     limits = current.module.isolated
     assert limits is not None
     job = Job(address, inputs, filled, limits.memory, current.deadline.at, told)
@@ -129,8 +128,6 @@ class _Isolated:
 
     def live(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """In real time."""
-        from anytime.worker_process import BEGUN, DONE, JOB, LEAVE, POST
-
         worker, deadline = self.worker, self.run.deadline
         worker.idle, worker.ends = False, deadline.at
         complete, fault = False, None
@@ -157,8 +154,6 @@ class _Isolated:
         return complete, self._unpacked() or fault
 
     def _stop(self) -> None:
-        from anytime.worker_process import STOP
-
         self.worker.ends = time.perf_counter()
         self.worker.mailbox.send(STOP, until=self.worker.ends)
 
@@ -176,8 +171,6 @@ class _Isolated:
 
     def live_told(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """On the caller's clock: each check-point waits for its answer."""
-        from anytime.worker_process import BEGUN, DONE, GO, JOB, LEAVE, POST, STOP
-
         worker, deadline, run = self.worker, self.run.deadline, self.run
         worker.idle = False
         complete, fault, stops = False, None, 0
@@ -246,8 +239,6 @@ class _Isolated:
         return pickle.loads(value) if self.run.observed else None
 
     def _read(self, content: bytes) -> tuple[float, float | None, tuple[float, ...], bytes | None]:
-        from anytime.worker_process import POSTED
-
         at, valued, seen, count = POSTED.unpack_from(content)
         ends = POSTED.size + 8 * count
         charges = struct.unpack(f"<{count}d", content[POSTED.size : ends])

@@ -15,10 +15,9 @@ import pickle
 import resource
 import socket
 import struct
-import sys
 import threading
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from anytime import isolation, naming
@@ -28,25 +27,23 @@ from anytime.mail import ClosedError, Mailbox
 from anytime.modules import Module
 from anytime.results import Fault
 from anytime.running import Run, perform
+from anytime.worker_letters import (
+    BEGUN,
+    DONE,
+    GRACE,
+    JOB,
+    LAST,
+    LEAVE,
+    POST,
+    POSTED,
+    READY,
+    STOP,
+    Job,
+)
 
-READY, JOB, BEGUN, POST, LAST, STOP, GO, DONE, LEAVE = (bytes([code]) for code in b"RJBPLSGDA")
-POSTED = struct.Struct("<d?dI")  # time, whether there is a value, its estimate or NaN, charges
-GRACE = 0.1  # seconds after its deadline in which a module may come to its next check-point
 _ALONE = 120.0  # seconds without an answer after which a worker takes its caller for dead
 _TOLD = 2000  # characters of what a fault says
 _LONGEST = 1e6  # seconds that the watchdog can be set to
-
-
-@dataclass(frozen=True)
-class Job:
-    """What a worker is to run, and until when on `time.perf_counter`; `told`: see `_ToldClock`."""
-
-    module: tuple[str, str, str]
-    inputs: tuple[Any, ...]
-    filled: dict[str, Any]
-    memory: int
-    ends: float
-    told: float | None = None
 
 
 class _ToldClock:
@@ -236,11 +233,3 @@ def _left_something() -> bool:
     except ChildProcessError:
         return False
     return True
-
-
-def program(descriptor: int, known: list[tuple[str, str, str]]) -> str:
-    """The text of a Python program that serves at this descriptor."""
-    return (
-        f"import sys; sys.path[:] = {sys.path!r}\n"
-        f"from anytime.worker_process import main; main({descriptor}, {known!r})"
-    )

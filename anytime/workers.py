@@ -14,10 +14,18 @@ import time
 
 from anytime import naming
 from anytime.mail import ClosedError, Letter, Mailbox
-from anytime.worker_process import DONE, GRACE, READY, program
+from anytime.worker_letters import DONE, GRACE, READY
 
 KEPT = 2  # processes: one to work and one that is warm
 _LOOK = 0.002  # seconds between two looks at who is ready
+
+
+def _program(descriptor: int, known: list[naming.Address]) -> str:
+    """The text of a Python program that serves at this descriptor."""
+    return (
+        f"import sys; sys.path[:] = {sys.path!r}\n"
+        f"from anytime.worker_process import main; main({descriptor}, {known!r})"
+    )
 
 
 class Worker:
@@ -29,7 +37,7 @@ class Worker:
             # A session of its own: a Ctrl-C at the terminal is the caller's, and whatever the
             # module starts dies with the worker.
             self.process = subprocess.Popen(
-                [sys.executable, "-c", program(theirs.fileno(), known)],
+                [sys.executable, "-c", _program(theirs.fileno(), known)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,

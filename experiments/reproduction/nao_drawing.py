@@ -68,7 +68,7 @@ def plans(folder: Path, seed: int) -> Picture:
         axes.set(title=title, xlabel="ahead [m]", ylim=(-0.6, 0.6), xlim=(-0.15, 1.8))
         axes.set_aspect("equal")
     panels[0].set_ylabel("aside [m]")
-    panels[0].legend(frameon=False, loc="lower center", fontsize=8)
+    panels[2].legend(frameon=False, loc="lower center", fontsize=8)
     caption = (
         f"[PRP16] Fig. 1 and §4: where the best plan leads after {2 * LATE:g} s of search, "
         f"{_SEARCHES} draws in each way. Cross: the goal; grey: an obstacle; dotted: one that has "
