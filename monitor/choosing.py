@@ -14,6 +14,7 @@ from monitor.courses import Leg
 from monitor.missions import Mission
 from monitor.monitoring import Monitor
 from monitor.policies import Constant, Policy, constant
+from monitor.reports import Report
 from monitor.rhythms import Rhythm
 from monitor.states import Decision, State
 
@@ -25,13 +26,14 @@ SPEEDS = 19
 class Verdict:
     """What held-out missions said of several policies.
 
-    name: of the best. nets: net value of each mission, by policy, on the same seeds. worth: mean
-    net value to expect of the best. missed: by how much that is more than it promises itself; None
-    if it foresees nothing.
+    name: of the best. nets: net value of each mission, by policy, on the same seeds; alone: of
+    those that the best lived afterwards. worth: their mean, what is to be expected of it. missed:
+    by how much that is more than it promises itself; None if it foresees nothing.
     """
 
     name: str
     nets: Mapping[str, tuple[float, ...]]
+    alone: tuple[float, ...]
     worth: float
     missed: float | None
 
@@ -68,33 +70,25 @@ def judge_policies(
     make_robot: MakeRobot,
     *,
     seeds: Sequence[int],
+    further: Sequence[int],
 ) -> Verdict:
-    """Which has the greatest mean net value on these seeds, which made none of them."""
-    lived = {
-        name: [
-            Monitor(program, policy, name, rhythm).run(mission, make_robot(), seed=seed)
-            for seed in seeds
-        ]
-        for name, policy in policies.items()
-    }
-    nets = {name: tuple(report.net for report in reports) for name, reports in lived.items()}
-    name = max(policies, key=lambda each: float(np.mean(nets[each])))
-    worth = worth_of_choice(np.array([nets[each] for each in policies]))
-    missed = worth - float(np.mean([report.promised for report in lived[name]]))
-    return Verdict(name, nets, worth, missed if np.isfinite(missed) else None)
+    """Which has the greatest mean net value on these seeds, which made none of them.
 
-
-def worth_of_choice(nets: Floats) -> float:
-    """Mean net value of the policy that is best on missions, on missions that did not choose it.
-
-    nets: [P, M] of policies on the same M missions. The best of several means is too good by the
-    luck that made it the best; so each mission is lived with what the others would have chosen.
+    further: seeds of missions that the best of them lives alone. What these were worth is what it
+    promises: they had no part in the choice, so they do not know the luck that made it the best.
     """
-    missions = nets.shape[1]
-    if missions == 1:
-        return float(nets.max())
-    others = nets.sum(axis=1, keepdims=True) - nets
-    return float(nets[others.argmax(axis=0), np.arange(missions)].mean())
+
+    def live(name: str, seeds: Sequence[int]) -> list[Report]:
+        monitor = Monitor(program, policies[name], name, rhythm)
+        return [monitor.run(mission, make_robot(), seed=seed) for seed in seeds]
+
+    nets = {name: tuple(report.net for report in live(name, seeds)) for name in policies}
+    name = max(policies, key=lambda each: float(np.mean(nets[each])))
+    reports = live(name, further)
+    alone = tuple(report.net for report in reports)
+    worth = float(np.mean(alone))
+    missed = worth - float(np.mean([report.promised for report in reports]))
+    return Verdict(name, nets, alone, worth, missed if np.isfinite(missed) else None)
 
 
 def tuned_division(

@@ -38,24 +38,30 @@ RHYTHM_SEED, CALIBRATION_SEED, CHOICE_SEED = 1_000_000, 2_000_000, 2_500_000
 
 @dataclass(frozen=True)
 class Effort:
-    """How many missions are lived for calibration: levels of sensing × seeds, then seeds; and to
-    choose the policy, seeds for each."""
+    """How many missions are lived for calibration: levels of sensing × seeds, then seeds; to choose
+    the policy, seeds for each, and so many more to learn what the chosen one is worth."""
 
     levels: int = 6
     rhythm_seeds: int = 12
     seeds: int = 16
     choice_seeds: int = 40
+    promise_seeds: int = 120
 
 
-QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, choice_seeds=4)
+QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, choice_seeds=4, promise_seeds=4)
 LONG = 400.0  # cells; calibration lives fewer missions that are longer than this
 
 
 def effort_for(scene: Scene) -> Effort:
     """The effort that a scene needs: less the longer its missions are."""
     share = min(1.0, LONG / max(scene.optimal, 1.0)) if np.isfinite(scene.optimal) else 0.0
+    usual = Effort()
     return Effort(
-        6, max(3, round(12 * share)), max(6, round(16 * share)), max(6, round(40 * share))
+        usual.levels,
+        max(3, round(share * usual.rhythm_seeds)),
+        max(6, round(share * usual.seeds)),
+        max(6, round(share * usual.choice_seeds)),
+        max(6, round(share * usual.promise_seeds)),
     )
 
 
@@ -136,13 +142,20 @@ class Briefing:
         fixed = tuned_division(self.program, self.grid.mission, self.lived)
         if fixed is not None:
             policies["fixed"] = fixed
-        seeds = range(CHOICE_SEED, CHOICE_SEED + self.effort.choice_seeds)
+        last = CHOICE_SEED + self.effort.choice_seeds
+        seeds, further = range(CHOICE_SEED, last), range(last, last + self.effort.promise_seeds)
         verdict = self.memory.recall(
             "verdict",
             self._learnt_from,
             Verdict,
             lambda: judge_policies(
-                self.program, self.grid.mission, policies, self.rhythm, self.robot, seeds=seeds
+                self.program,
+                self.grid.mission,
+                policies,
+                self.rhythm,
+                self.robot,
+                seeds=seeds,
+                further=further,
             ),
         )
         return Chosen(policies, verdict)

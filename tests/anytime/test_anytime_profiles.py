@@ -63,6 +63,11 @@ def test_expected_quality_never_falls_with_time_and_stays_in_the_unit_interval(p
     assert ((means >= 0) & (means <= 1)).all()
 
 
+def test_perfect_runs_expect_one_and_not_a_bit_more():
+    perfect = tuple(recording(f"{number}", [1.0], [1.0 + number]) for number in range(20))
+    assert Profile("see", (), perfect).mean([30.0], as_measured=True).tolist() == [1.0]
+
+
 @given(profiles(), moments)
 def test_the_envelope_is_the_best_so_far_of_what_was_measured(profile, times):
     measured = profile.mean(times, as_measured=True)
@@ -397,6 +402,12 @@ def test_the_text_says_how_long_the_runs_were_and_when_there_was_a_first_result(
     assert "1 problems, 2 runs" in text
     assert "q .40 in 500.0 ms" in repr(Profile("see", (), (recording("a", [0.4], [0.5]),)))
     assert len(repr(Profile("x" * 200, (), (long,)))) == 100
+
+
+def test_a_picture_begins_with_no_time_at_all():
+    first = Profile("see", (), (recording("a", [0.5], [0.25]),)).picture()
+    later = Profile("see", (), (recording("a", [0.5], [25.0]),)).picture()
+    assert all(">0<" in picture for picture in (first, later))
 
 
 def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good_ones():

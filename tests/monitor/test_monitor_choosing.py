@@ -10,7 +10,7 @@ import pytest
 from anytime import AnytimeError
 from experiments import shipped
 from monitor import Energy, Mission, News, State, Value
-from monitor.choosing import Chosen, judge_policies, tuned_division, worth_of_choice
+from monitor.choosing import Chosen, judge_policies, tuned_division
 from monitor.logs import write_log
 from monitor.policies import constant
 from monitor.regrets import regrets
@@ -44,27 +44,37 @@ def test_the_best_on_held_out_missions_is_chosen_and_acts(briefing):
     shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
     policies = {"slow": constant(shares, 1.0), "brisk": constant(shares, 5.0)}
     verdict = judge_policies(
-        briefing.program, MISSION, policies, None, briefing.robot, seeds=range(70, 73)
+        briefing.program,
+        MISSION,
+        policies,
+        None,
+        briefing.robot,
+        seeds=range(70, 73),
+        further=range(73, 76),
     )
     assert verdict.name == "brisk"
     assert np.mean(verdict.nets["brisk"]) > np.mean(verdict.nets["slow"])
     chosen = Chosen(policies, verdict)
     asked = State("frame", 0.0, Situation(0.0, 40.0, 0.0), standing=True, route=40.0)
     assert chosen(asked).speed == 5.0
-    assert chosen(asked).why.net == pytest.approx(np.mean(verdict.nets["brisk"]))
+    assert chosen(asked).why.net == pytest.approx(np.mean(verdict.alone))
 
 
-def test_of_policies_that_are_alike_the_best_by_luck_is_not_promised_its_luck():
-    drawn = np.random.default_rng(0).random((2000, 4, 12))
-    promised = np.array([worth_of_choice(nets) for nets in drawn])
-    assert promised.mean() == pytest.approx(0.5, abs=0.01)
-    assert drawn.mean(axis=2).max(axis=1).mean() > 0.55
-
-
-def test_a_policy_that_is_always_best_is_worth_its_mean():
-    nets = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    assert worth_of_choice(nets) == 5.0
-    assert worth_of_choice(nets[:, :1]) == 4.0
+def test_what_the_best_promises_is_what_it_was_worth_where_nothing_was_chosen(briefing):
+    shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
+    alike = {f"brisk {number}": constant(shares, 5.0) for number in range(2)}
+    verdict = judge_policies(
+        briefing.program,
+        MISSION,
+        alike,
+        None,
+        briefing.robot,
+        seeds=range(70, 72),
+        further=range(72, 76),
+    )
+    assert [len(nets) for nets in verdict.nets.values()] == [2, 2]
+    assert len(verdict.alone) == 4
+    assert verdict.worth == pytest.approx(np.mean(verdict.alone))
 
 
 def test_optimal_is_one_of_the_table_the_expectation_and_a_fixed_division(briefing):

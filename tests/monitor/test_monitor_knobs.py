@@ -39,7 +39,7 @@ def briefing():
     library = anytime.measure(navigate, problems, seconds=8.0, clock=lambda: WorkClock(REFERENCE))
     mission = Mission(Value("linear", 100.0, 60.0), Energy(0.2, 0.08, 0.03))
     program = compiler.compile(navigate, library)
-    effort = Effort(levels=3, rhythm_seeds=1, seeds=2, choice_seeds=2)
+    effort = Effort(levels=3, rhythm_seeds=1, seeds=2, choice_seeds=2, promise_seeds=2)
     return brief_with(program, GridMission(mission, scene, REFERENCE), effort)
 
 

@@ -47,6 +47,19 @@ def state(time=0.0, to_go=200.0, in_hand=0.0, energy=0.0, **changes) -> State:
     return replace(base, **changes)
 
 
+def test_within_a_frame_the_expectation_changes_the_speed_and_nothing_else():
+    policy = Expected(MISSION, CONTRACTS, RHYTHM, Spread((0.0,), ((0.8, 1.0, 1.5),)))
+    begun = replace(policy(state()), speed=MISSION.speeds[0])
+    late = state(150.0, 200.0, moment="call", contract=begun)
+    changed = policy(late)
+    assert changed.shares == begun.shares
+    assert changed.speed == policy(replace(late, moment="frame")).speed
+    assert changed.why is not None
+    assert changed.why.case == "speed re-chosen"
+    with pytest.raises(ValueError, match="a frame in progress has a contract"):
+        policy(replace(late, contract=None))
+
+
 @given(st.floats(0, 190), st.floats(0, 500), st.floats(0, 50), st.floats(0, 300))
 def test_the_same_state_leads_to_the_same_decision_within_the_limits(time, to_go, in_hand, energy):
     for policy in (
