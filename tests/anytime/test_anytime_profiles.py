@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -405,9 +406,11 @@ def test_the_text_says_how_long_the_runs_were_and_when_there_was_a_first_result(
 
 
 def test_a_picture_begins_with_no_time_at_all():
-    first = Profile("see", (), (recording("a", [0.5], [0.25]),)).picture()
-    later = Profile("see", (), (recording("a", [0.5], [25.0]),)).picture()
-    assert all(">0<" in picture for picture in (first, later))
+    picture = Profile("see", (), (recording("a", [0.5], [25.0]),)).picture()
+    times = re.findall(r'text-anchor="middle">([^<]*)</text>', picture)
+    assert times[:6] == ["0", "5", "10", "15", "20", "25"]
+    left = re.findall(r'<text x="([^"]*)"[^>]*text-anchor="middle">0<', picture)
+    assert re.findall(r'<polyline points="([^,]*),', picture) == left
 
 
 def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good_ones():
