@@ -40,18 +40,17 @@ def log_of(report, folder):
     return write_log(folder / "mission.jsonl", MISSION, None, report).read_bytes()
 
 
+def judged(briefing, policies):
+    """The verdict of three missions, and of four that the best of the policies lives alone."""
+    program, robot = briefing.program, briefing.robot
+    seeds, further = range(70, 73), range(73, 77)
+    return judge_policies(program, MISSION, policies, None, robot, seeds=seeds, further=further)
+
+
 def test_the_best_on_held_out_missions_is_chosen_and_acts(briefing):
     shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
     policies = {"slow": constant(shares, 1.0), "brisk": constant(shares, 5.0)}
-    verdict = judge_policies(
-        briefing.program,
-        MISSION,
-        policies,
-        None,
-        briefing.robot,
-        seeds=range(70, 73),
-        further=range(73, 76),
-    )
+    verdict = judged(briefing, policies)
     assert verdict.name == "brisk"
     assert np.mean(verdict.nets["brisk"]) > np.mean(verdict.nets["slow"])
     chosen = Chosen(policies, verdict)
@@ -63,16 +62,8 @@ def test_the_best_on_held_out_missions_is_chosen_and_acts(briefing):
 def test_what_the_best_promises_is_what_it_was_worth_where_nothing_was_chosen(briefing):
     shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
     alike = {f"brisk {number}": constant(shares, 5.0) for number in range(2)}
-    verdict = judge_policies(
-        briefing.program,
-        MISSION,
-        alike,
-        None,
-        briefing.robot,
-        seeds=range(70, 72),
-        further=range(72, 76),
-    )
-    assert [len(nets) for nets in verdict.nets.values()] == [2, 2]
+    verdict = judged(briefing, alike)
+    assert [len(nets) for nets in verdict.nets.values()] == [3, 3]
     assert len(verdict.alone) == 4
     assert verdict.worth == pytest.approx(np.mean(verdict.alone))
 
