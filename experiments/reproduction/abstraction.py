@@ -29,6 +29,8 @@ from sensing.vision import sense
 FAMILY, SIZE = "r20", 128
 VISION = 0.96
 """Quality of vision in the paper's §3.5."""
+FLOORS = 30
+"""Of a picture, from which the one in the middle is drawn."""
 BATCH = 8
 """Domains of a draw of what is said on average: its figure is a ratio of their sums or means."""
 ENOUGH_QUALITY = 0.93
@@ -74,10 +76,10 @@ class Floors:
 PERFECT, IMPERFECT = Floors(), Floors(vision=VISION)
 
 
-def median_floor(seed: int, count: int) -> int:
-    """The index of the floor whose first plan is the median of so many, in the paper's way."""
-    indices = range(seed, seed + count)
-    return sorted(indices, key=lambda index: float(course(index, PAPER).quality[0]))[count // 2]
+def median_floor(seed: int) -> int:
+    """The index of the floor, of `FLOORS`, whose first plan is the median, in the paper's way."""
+    indices = range(seed, seed + FLOORS)
+    return sorted(indices, key=lambda index: float(course(index, PAPER).quality[0]))[FLOORS // 2]
 
 
 @lru_cache(maxsize=128)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.reproduction.abstraction import SIZE, course, median_floor
+from experiments.reproduction.abstraction import FLOORS, SIZE, course, median_floor
 from experiments.reproduction.animations import (
     Animated,
     Animation,
@@ -19,13 +19,12 @@ from experiments.reproduction.animations import (
 from experiments.reproduction.ways import OURS, PAPER
 from planners.avoidance import blind_walk
 
-_FLOORS = 30  # of which the one in the middle is shown
 _MOST = 90  # moments
 
 
 def animate(folder: Path, seed: int) -> tuple[Animated, ...]:
     """The planning of Fig. 4, plan by plan, in the paper's way and in ours."""
-    index = median_floor(seed, _FLOORS)
+    index = median_floor(seed)
     papers, ours = (course(index, way) for way in (PAPER, OURS))
     works = np.unique(np.concatenate([papers.work, ours.work]))
     if len(works) > _MOST:
@@ -61,6 +60,6 @@ def animate(folder: Path, seed: int) -> tuple[Animated, ...]:
     caption = (
         "Fig. 4, plan by plan: squares are the cells of the paper's plan, on whatever level, the "
         "blue line what a robot walks that knows nothing else; and the way of our planner after "
-        f"the same work. Of {_FLOORS} floors, the one whose first plan is the median."
+        f"the same work. Of {FLOORS} floors, the one whose first plan is the median."
     )
     return (save(shown, folder, "zr", "plans", caption),)

@@ -12,6 +12,7 @@ from anytime.pictures import COLOURS
 from experiments.domains import MACHINE
 from experiments.reproduction.abstraction import (
     FAMILY,
+    FLOORS,
     IMPERFECT,
     SIZE,
     Course,
@@ -30,7 +31,6 @@ from planners.multipath import MultiPath
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_FLOORS = 30  # of Fig. 4 to 6, and looks of Fig. 2
 _LIBRARIES = 5  # of Fig. 7 and 8, each of as many domains as a draw has
 _TITLES = ("Level 3", "Levels 1 and 0")
 _WAYS = ((PAPER, "the paper's planner"), (OURS, "ours"))
@@ -50,7 +50,7 @@ def draw(folder: Path, seed: int) -> tuple[Picture, ...]:
 def _vision(folder: Path, seed: int) -> Picture:
     figure, (axes,) = new_figure(5.2, 3.4)
     for place, (way, label) in enumerate(((PAPER, "the paper's sensor"), (OURS, "camera"))):
-        seen = np.array([qualities(one, way.device) for one in range(seed, seed + _FLOORS)])
+        seen = np.array([qualities(one, way.device) for one in range(seed, seed + FLOORS)])
         times = MACHINE.seconds("see", 1.0) * np.arange(1, seen.shape[1] + 1)
         there = ~np.isnan(seen[0])
         curve(axes, place, times[there], seen[:, there], label)
@@ -58,14 +58,14 @@ def _vision(folder: Path, seed: int) -> Picture:
     axes.set(xlabel="run-time [s]", ylabel="quality of vision", xlim=(0, None), ylim=(0.5, 1.005))
     axes.legend(frameon=False, loc="lower right")
     caption = (
-        f"Fig. 2, the profile of vision: share of cells told rightly, mean of {_FLOORS} looks with "
+        f"Fig. 2, the profile of vision: share of cells told rightly, mean of {FLOORS} looks with "
         "its 95 % interval. o: Ta, before which there is no description."
     )
     return save(figure, folder, "zr", "fig2-vision", caption)
 
 
 def _plans(folder: Path, seed: int) -> Picture:
-    index = median_floor(seed, _FLOORS)
+    index = median_floor(seed)
     found = course(index, PAPER)
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
@@ -74,14 +74,14 @@ def _plans(folder: Path, seed: int) -> Picture:
         _on_map(axes, found, at, title)
     caption = (
         "Fig. 4, plans with perfect vision: cells of the plan (broken squares) and the way that a "
-        f"robot walks that knows nothing but the plan. Of {_FLOORS} floors, the one whose level 3 "
+        f"robot walks that knows nothing but the plan. Of {FLOORS} floors, the one whose level 3 "
         "plan is the median."
     )
     return save(figure, folder, "zr", "fig4-plans", caption)
 
 
 def _noisy_plans(folder: Path, seed: int) -> Picture:
-    found = course(median_floor(seed, _FLOORS), PAPER, IMPERFECT)
+    found = course(median_floor(seed), PAPER, IMPERFECT)
     place = mixed(found)
     figure, panels = new_figure(8.4, 4.5, columns=2)
     chosen = (0, place if place is not None else len(found.plans) - 1)
@@ -116,14 +116,14 @@ def _planner(folder: Path, seed: int) -> Picture:
     shares = np.linspace(0.0, 1.2, 241)
     figure, (axes,) = new_figure(5.2, 3.4)
     for place, (way, label) in enumerate(_WAYS):
-        samples = [_by_share(course(one, way), shares) for one in range(seed, seed + _FLOORS)]
+        samples = [_by_share(course(one, way), shares) for one in range(seed, seed + FLOORS)]
         curve(axes, place, shares, np.array(samples), label)
     axes.plot(0.27, 0.93, "D", color="black", markersize=5, label="printed: 0.93 at 27 %")
     axes.set(xlabel="expansions / those of A*", ylabel="expected quality of the plan")
     axes.set(xlim=(0, 1.2), ylim=(0.5, 1.005))
     axes.legend(frameon=False, loc="lower right")
     caption = (
-        f"Fig. 5, the planner's profile with perfect vision: mean of {_FLOORS} floors of {SIZE} × "
+        f"Fig. 5, the planner's profile with perfect vision: mean of {FLOORS} floors of {SIZE} × "
         f"{SIZE} cells, {int(FAMILY[1:])} % blocked, with its 95 % interval; no plan counts 0."
     )
     return save(figure, folder, "zr", "fig5-planner", caption)

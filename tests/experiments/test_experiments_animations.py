@@ -23,6 +23,8 @@ from experiments.reproduction.page import page
 from experiments.reproduction.searches import EARLY, MOVING
 from experiments.reproduction.ways import OURS
 
+FIGURES = ("paper", "ours", "low", "high", "held", "ours_best", "held_by_ours")
+"""Of a claim, in the JSON of a reproduction."""
 MADE_UP = Animation(
     "a <title>",
     "m",
@@ -153,6 +155,3 @@ def test_the_page_plays_an_animation(browser, tmp_path, width):
     browser.run("document.querySelector('button').click()")
     assert browser.run("document.querySelector('button').ariaLabel") == "play"
     assert browser.errors == []
-
-
-FIGURES = ("paper", "ours", "low", "high", "held", "ours_best", "held_by_ours")

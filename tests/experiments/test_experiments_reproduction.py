@@ -196,11 +196,8 @@ def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp
     monkeypatch.setattr(
         nao, "CLAIMS", few("prp.toy", "prp.obstacle_step", "prp.collision_on_crossing")
     )
-    monkeypatch.setattr(nao, "draw", lambda folder, seed: (nao_drawing.objective(folder, seed),))
-    around = nao_animations.SEARCHES[0]
-    monkeypatch.setattr(
-        nao, "animate", lambda folder, seed: (nao_animations.search(folder, seed, *around),)
-    )
+    monkeypatch.setattr(nao_drawing, "_SEARCHES", 1)
+    monkeypatch.setattr(nao_animations, "SEARCHES", nao_animations.SEARCHES[:1])
     monkeypatch.setattr(reproducing, "QUICK_DRAWS", 2)
     words = ["reproduce", "nao", "--quick", "--json", "-o", str(tmp_path)]
     assert main(words) == 0
@@ -209,16 +206,18 @@ def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp
     toy = told["figures"]["claim"]["prp"]["toy"]
     assert {"paper", "ours", "low", "high", "held", "ours_best"} <= set(toy)
     assert told["settings"]["claims"]["prp.toy"]
-    picture = tmp_path / "figures" / "nao-objective.png"
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    for name in ("plans", "objective"):
+        picture = tmp_path / "figures" / f"nao-{name}.png"
+        assert picture.read_bytes().startswith(b"\x89PNG")
     assert json.loads((tmp_path / "results.json").read_text()) == told
     assert "prp" in (tmp_path / "results.md").read_text().lower()
     page = (tmp_path / "reproduce.html").read_text()
-    assert "<svg" in page
-    assert "<canvas" in page
+    assert page.count('<svg role="img"') == 2
+    assert page.count("<canvas") == 5  # a search and four missions
     kept = (tmp_path / FILE).read_bytes()
     (tmp_path / FILE).write_bytes(kept[:-10])  # of the last line, which says that nothing was swept
-    monkeypatch.setattr(nao, "draw", lambda folder, seed: ())  # as before, and it takes seconds
+    for made in ("draw", "animate"):  # as before, and it takes seconds
+        monkeypatch.setattr(nao, made, lambda folder, seed: ())
     assert main([*words, "--resume"]) == 0
     assert json.loads(capsys.readouterr().out)["figures"] == told["figures"]
     assert (tmp_path / FILE).read_bytes() == kept
