@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 import anytime
 from anytime.errors import AnytimeError
 from planners.atp import GRAIN
-from planners.frontier import cells_of, least_way, next_base, path_to, pop, sift_up
+from planners.frontier import least_way, next_base, path_to, pop, sift_up
 from planners.grids import Grid, endpoints
 from planners.multipath import NO_WAY, Step, way_plan
 from planners.path_finding import Cell
 from planners.problems import known_floors, walked_quality
 from planners.search import DIAGONAL, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "b86d788aa346"
+CALLED = "51b6350f92ee"
 
 WEIGHTS = (3.0, 2.5, 2.0, 1.5, 1.4, 1.3, 1.2, 1.1, 1.05, 1.02, 1.0)
 """Weights of the heuristic, one after the other."""
@@ -88,7 +88,7 @@ def steps(
             if cost < known:
                 known = cost
                 way = path_to(grid.cost, grid.wall, columns, first, last, diagonals, run)
-                plan = way_plan(*cells_of(way, columns), cost, least)
+                plan = way_plan(way, columns, cost, least)
             yield Step(float(taken), plan)
     if known == SPAN:
         yield Step(0.0, NO_WAY)

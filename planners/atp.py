@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import anytime
 from planners import blocks, improving, region_search, tracing
-from planners.frontier import cells_of, least_way
+from planners.frontier import least_way
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
@@ -29,7 +29,8 @@ from planners.problems import known_floors, walked_quality
 from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
 GRAIN = 500
-"""Expansions between two steps: a fraction of a millisecond."""
+"""Expansions between two steps: a fraction of a millisecond …"""
+_FIRST_GRAIN = 2 * GRAIN  # … more of them while there is no way yet that could be told
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
@@ -117,7 +118,7 @@ class _Query:
         if clustering < _CLUSTERED:
             yield from self.search(_FIRST, patience=_PATIENCE * far)
             for scale in _SCALES:
-                if not self.done:
+                if not self.done and not math.isinf(self.cost):
                     yield from self.search(scale)
             if self.done:
                 return
@@ -153,10 +154,10 @@ class _Query:
         run, state, exact = self.run, self.run.state, scale is None
         known = not math.isinf(self.cost)
         if scale is not None and known:
-            run.norm[:] = self._norm(1.0)
+            self._expect(1.0)
             expected = int(improving.estimated(self.down, self.across, run.norm))
             scale = max(scale, _TRUSTED * self.cost / expected)
-        run.norm[:] = self._norm(scale)
+        self._expect(scale)
         improving.begin(
             self.grid.cost, self.grid.shape[1], self.start, self.goal,
             int(self.cost) if known else SPAN, exact, run,
@@ -165,9 +166,10 @@ class _Query:
             improving.follow_way(*self._map, run)
         else:
             state[COUNT] = 0
+        grain = GRAIN if known else _FIRST_GRAIN
         spent, done, left = 0, OUT_OF_BUDGET, patience
         while done == OUT_OF_BUDGET and spent < budget:
-            most = min(GRAIN, budget - spent)
+            most = min(grain, budget - spent)
             done, taken = improving.search(*self._map, self.goal, self.diagonals, run, most)
             spent += taken
             left -= taken
@@ -178,21 +180,22 @@ class _Query:
                     self.least = max(self.least, int(state[CURRENT]) << int(state[SHIFT]))
                 elif scale is not None and left < 0:
                     scale, left = 1.25 * scale, patience
-                    run.norm[:] = self._norm(scale)
+                    self._expect(scale)
                     improving.reweigh(self.grid.shape[1], self.goal, run)
                 yield float(taken)
         if done == OUT_OF_BUDGET:
             return
         if state[MEETING] >= 0:
             self.cost = int(improving.take_up(*self._map, self.start, self.diagonals, run))
-        if exact or math.isinf(self.cost):
+        if exact:
             self.least = self.cost
         yield float(taken)
 
-    def _norm(self, scale: float | None) -> list[int]:
+    def _expect(self, scale: float | None) -> None:
         if scale is None:
-            return least_norm(self.diagonals)
-        return expected_norm(self.grid.features[0], scale, self.diagonals)
+            least_norm(self.diagonals, self.run.norm)
+        else:
+            expected_norm(self.grid.features[0], scale, self.diagonals, self.run.norm)
 
     def over_regions(self) -> Iterator[float]:
         """A first way over the graph of regions."""
@@ -209,7 +212,7 @@ class _Query:
             while found == OUT_OF_BUDGET:
                 found, taken = region_search.search_regions(
                     *soft, self.goal, self.diagonals, percent, grid.regions, run,
-                    GRAIN * blocks.EXPANDED // 2,
+                    _FIRST_GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
                 work += taken
                 self.coarse += taken / blocks.EXPANDED
@@ -235,7 +238,7 @@ class _Query:
         """Make the way optimal in windows of that many cells, one after the other."""
         state, done = self.run.state, False
         state[improving.POSITION] = 0
-        self.run.norm[:] = self._norm(None)
+        self._expect(None)
         while not done:
             done, taken = improving.improve_windows(
                 *self._map, length, self.diagonals, self.run, GRAIN
@@ -250,11 +253,12 @@ class _Query:
 
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
-        way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
+        way = self.run.path[: self.run.state[COUNT]]
         if self.run.state[MEETING] >= 0:
+            way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
             # Labels that were corrected since may have made it even shorter than was told.
             self.cost = int(improving.way_cost(*self._map, way, 0, len(way) - 1))
-        return way_plan(*cells_of(way, self.grid.shape[1]), self.cost, self.least)
+        return way_plan(way, self.grid.shape[1], self.cost, self.least)
 
 
 _region_runs: dict[tuple[int, int], list[region_search.RegionRun]] = {}

@@ -77,7 +77,7 @@ def walk(
         limit,
         workspace(world.size),
     )
-    cells, diagonal = cells_of(path, shape[1])
+    cells, diagonal = cells_of(path, shape[1], 0)
     return Walk(
         cells=cells,
         length=len(cells) - 1 - diagonal + diagonal * math.sqrt(2),

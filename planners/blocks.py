@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from planners.frontier import NOT_FIRST, NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "b86d788aa346"
+CALLED = "51b6350f92ee"
 
 SIDE, MOST = 8, 32
 UNKNOWN = 255
@@ -27,6 +27,7 @@ FIRST_ROW = np.uint64(0xFF)
 FIRST_COLUMN = np.uint64(0x0101010101010101)
 LAST_BIT = np.uint64(SIDE - 1)
 GATHER = np.uint64(0x0102040810204080)
+HIGH_BITS = ~np.uint64(0x7F7F7F7F7F7F7F7F)
 
 
 class Regions(NamedTuple):
@@ -53,18 +54,37 @@ def new_regions(rows: int, columns: int) -> Regions:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pack(cost, wall, dearest, columns, block):
+def _eight(cost, first):
+    """Eight cells as the bytes of a word: one load, as the indices are unsigned."""
+    place, word = np.uint64(first), ZERO
+    word |= np.uint64(cost[place]) | np.uint64(cost[place + ONE]) << SIDE_BITS
+    word |= np.uint64(cost[place + np.uint64(2)]) << np.uint64(16)
+    word |= np.uint64(cost[place + np.uint64(3)]) << np.uint64(24)
+    word |= np.uint64(cost[place + np.uint64(4)]) << np.uint64(32)
+    word |= np.uint64(cost[place + np.uint64(5)]) << np.uint64(40)
+    word |= np.uint64(cost[place + np.uint64(6)]) << np.uint64(48)
+    return word | np.uint64(cost[place + LAST_BIT]) << LAST_ROW
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pack(cost, wall, dearest, columns, block):
     """The cells of a block that cost at most `dearest`, as bits; cells off the map are walls."""
     rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
     top, left = block // across * SIDE, block % across * SIDE
-    word, bit = ZERO, ONE
-    for row in range(top, top + SIDE):
-        for column in range(left, left + SIDE):
-            if row < rows and column < columns:
-                dear = int(cost[row * columns + column])
-                if dear != wall and dear <= dearest:
-                    word |= bit
-            bit <<= ONE
+    high, wide, word = min(SIDE, rows - top), min(SIDE, columns - left), ZERO
+    beyond = np.uint64(127 - dearest) * FIRST_COLUMN
+    for row in range(high):
+        first, bits = (top + row) * columns + left, ZERO
+        if wide < SIDE:
+            for along in range(wide):
+                dear = int(cost[first + along])
+                bits |= np.uint64((dear != wall) & (dear <= dearest)) << np.uint64(along)
+        else:
+            bits = _eight(cost, first)
+            if wall != 0:  # of a known map the bytes are bits already
+                bits = ~(((bits & ~HIGH_BITS) + beyond) | bits) >> LAST_BIT & FIRST_COLUMN
+            bits = (bits * GATHER) >> LAST_ROW
+        word |= bits << np.uint64(SIDE * row)
     return word
 
 
@@ -105,23 +125,25 @@ def _edges(mask):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def know(cost, wall, dearest, columns, block, regions):
-    """Part a block into regions if it is not known yet; return the work, in 1/256 expansions."""
-    if regions.count[block] != UNKNOWN:
-        return 0
-    word = _pack(cost, wall, dearest, columns, block)
+def part(cost, wall, dearest, columns, block, regions):
+    """Part an unknown block into regions; return the work, in 1/256 expansions.
+
+    Inlined, because a call would count references to all of the arrays.
+    """
+    counts, masks, edges = regions.count, regions.mask, regions.edge
+    word = pack(cost, wall, dearest, columns, block)
     work, count, left = SIDE * SIDE * STREAMED, 0, word
     while left != ZERO:
         fill, before = left & (~left + ONE), ZERO
-        while fill != before:
+        while fill != before and fill != left:
             before = fill
             fill = _smear(fill, word)
             work += TOUCHED
-        region = count * regions.count.size + block
-        regions.mask[region], regions.edge[region] = fill, _edges(fill)
+        region = count * counts.size + block
+        masks[region], edges[region] = fill, _edges(fill)
         left &= ~fill
         count += 1
-    regions.count[block] = count
+    counts[block] = count
     return work
 
 

@@ -18,7 +18,7 @@ from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
 
 CALLED = "faffbc721331"
 
-ONE, SIDE_BITS = np.uint64(1), np.uint64(8)
+ONE, SIDE_BITS, EVERY = np.uint64(1), np.uint64(8), ~np.uint64(0)
 NOT_FIRST = ~np.uint64(0x0101010101010101)
 NOT_LAST = ~np.uint64(0x8080808080808080)
 """In a word whose bit 8·row + column is a cell of a block: a step to the right and one down, all
@@ -124,9 +124,10 @@ def step_between(node, there, columns):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def cells_of(path, columns):
-    """Return a path as int32 [n, 2] cells, and how many of its steps are diagonal."""
-    cells, diagonal = np.empty((path.size, 2), np.int32), 0
+def cells_of(path, columns, ahead):
+    """Return a path as int32 [n, ahead + 2] cells, with so many zeros ahead of their rows and
+    columns, and how many of its steps are diagonal."""
+    cells, diagonal = np.zeros((path.size, ahead + 2), np.int32), 0
     if path.size == 0:
         return cells, diagonal
     node = np.int64(path[0])
@@ -136,7 +137,7 @@ def cells_of(path, columns):
         down, across = step_between(node, there, columns)
         row, column, node = row + down, column + across, there
         diagonal += down != 0 and across != 0
-        cells[place, 0], cells[place, 1] = row, column
+        cells[place, ahead], cells[place, ahead + 1] = row, column
     return cells, diagonal
 
 
@@ -209,6 +210,18 @@ def flood(mask, start, diagonals, waves):
         waves[count + 1] = wave(waves[count], mask, diagonals)
         count += 1
     return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def is_clear(mask, one, other):
+    """Whether the rectangle between two cells of a block is in the region, so that there is no
+    detour."""
+    row, column, other_row, other_column = one >> 3, one & 7, other >> 3, other & 7
+    left, right = min(column, other_column), max(column, other_column)
+    between = np.uint64((0xFF << left) & (0xFF >> (7 - right))) * ~NOT_FIRST
+    between &= EVERY << np.uint64(8 * min(row, other_row))
+    between &= EVERY >> np.uint64(8 * (7 - max(row, other_row)))
+    return mask & between == between
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -12,9 +12,23 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planners.frontier import next_base, path_to, step_between, step_cost, with_room
-from planners.search import DIAGONAL, LAST, OUT_OF_BUDGET, SPAN, STRAIGHT, WALL
+from planners.search import (
+    ACROSS,
+    DIAGONAL,
+    DOWN,
+    EIGHT_WAYS,
+    FIRST,
+    FOUR_WAYS,
+    LAST,
+    OUT_OF_BUDGET,
+    SET_OUT,
+    SPAN,
+    STEP,
+    STRAIGHT,
+    WALL,
+)
 
-CALLED = "b86d788aa346"
+CALLED = "51b6350f92ee"
 
 DONE = 0
 BUCKETS = 1 << 13
@@ -34,13 +48,15 @@ _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 class Run(NamedTuple):
     """Arrays of one planner at work. They are zeroed pages until they are touched.
 
-    Of every cell: label (`base` - g, one less when it is closed), prefix (`base` + cost of the way
-    in hand up to the cell). bucket: the first entry of each. entry, behind: an entry's cell and the
-    entry after it. norm: the heuristic, see `estimated`. path: flat indices of the way in hand.
+    Of every cell: label (`base` - g, one less when it is closed), came (the side to which the way
+    to it came), prefix (`base` + cost of the way in hand up to the cell). bucket: the first entry
+    of each. entry, behind: an entry's cell and the entry after it. norm: the heuristic, see
+    `estimated`. path: flat indices of the way in hand.
     """
 
     clock: NDArray[np.int64]
     label: NDArray[np.int64]
+    came: NDArray[np.uint8]
     prefix: NDArray[np.int64]
     bucket: NDArray[np.int32]
     entry: NDArray[np.int32]
@@ -56,6 +72,7 @@ def new_run(rows: int, columns: int) -> Run:
     return Run(
         clock=np.zeros(1, np.int64),
         label=np.zeros(cells, np.int64),
+        came=np.zeros(cells, np.uint8),
         prefix=np.zeros(cells, np.int64),
         bucket=np.full(BUCKETS, NOTHING, np.int32),
         entry=np.zeros(_ENTRIES * cells, np.int32),
@@ -111,7 +128,7 @@ def begin(cost, columns, start, goal, upper, exact, run):
     state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
     state[UPPER], state[GAIN], state[MEETING] = upper, 0, NOTHING
     state[FOLLOWS] = 0
-    run.label[start] = base
+    run.label[start], run.came[start] = base, SET_OUT
     run.entry[0], run.behind[0] = start, NOTHING
     bucket[state[CURRENT] & (BUCKETS - 1)] = 0
 
@@ -123,6 +140,9 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
     It is done when nothing open can beat the way in hand, as it is after `GAIN`; without an exact
     norm also when it has come to the goal, and then a node is closed for good. With an exact one
     the buckets correct labels: a node may be expanded twice while the same bucket is at work.
+    Where all cells cost the same, a way goes on to few sides only, as in `search.bucket_search`,
+    which spares most looks at labels. That is proven where nodes are closed in the order of an
+    exact norm: only then does an end without a way say that there is none.
     """
     # Arrays are taken out of the tuple once: inside the loop that would count references.
     state, label, prefix, norm = run.state, run.label, run.prefix, run.norm
@@ -130,6 +150,10 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
     one_far, one_near, two_far, two_near, three_far, three_near = (
         norm[0], norm[1], norm[2], norm[3], norm[4], norm[5],
     )  # fmt: skip
+    came, onward = run.came, EIGHT_WAYS if diagonals else FOUR_WAYS
+    apart = np.empty(8, np.int64)
+    for side in range(8):
+        apart[side] = DOWN[side] * columns + ACROSS[side]
     rows = cost.size // columns
     exact, follows = state[EXACT] != 0, state[FOLLOWS] != 0
     base, shift, current, opened = state[BASE], state[SHIFT], state[CURRENT], state[OPENED]
@@ -180,36 +204,22 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
                 continue
             break
         expansions += 1
-        # Cells off the map are walls; the orthogonal ones are read once for the diagonals.
-        north = int(cost[node - columns]) if row > 0 else wall
-        south = int(cost[node + columns]) if row + 1 < rows else wall
-        west = int(cost[node - 1]) if column > 0 else wall
-        east = int(cost[node + 1]) if column + 1 < columns else wall
-        for side in range(8 if diagonals else 4):
-            if side == 0:
-                swept, one, other, dr, dc = north, north, north, -1, 0
-            elif side == 1:
-                swept, one, other, dr, dc = south, south, south, 1, 0
-            elif side == 2:
-                swept, one, other, dr, dc = west, west, west, 0, -1
-            elif side == 3:
-                swept, one, other, dr, dc = east, east, east, 0, 1
-            elif side == 4:
-                swept, one, other, dr, dc = 0, north, west, -1, -1
-            elif side == 5:
-                swept, one, other, dr, dc = 0, north, east, -1, 1
-            elif side == 6:
-                swept, one, other, dr, dc = 0, south, west, 1, -1
-            else:
-                swept, one, other, dr, dc = 0, south, east, 1, 1
-            if one == wall or other == wall:
-                continue
-            there = node + dr * columns + dc
-            if side >= 4:
-                swept = int(cost[there])
-                if swept == wall:
-                    continue
-            new_g = g + (STRAIGHT if side < 4 else DIAGONAL) * max(swept, one, other)
+        inside, free = 0 < row < rows - 1 and 0 < column < columns - 1, 0
+        for side in range(8):
+            there_row, there_column = row + DOWN[side], column + ACROSS[side]
+            if inside or (0 <= there_row < rows and 0 <= there_column < columns):
+                free |= int(cost[node + apart[side]] != wall) << side
+        wanted = np.int64(onward[np.int64(came[node] if wall == 0 else SET_OUT) * 256 + free])
+        while wanted:
+            side = np.int64(FIRST[wanted])
+            wanted &= wanted - 1
+            there, dr, dc = node + apart[side], DOWN[side], ACROSS[side]
+            dearest = 1
+            if wall != 0:
+                dearest = int(cost[there])
+                if side >= 4:
+                    dearest = max(dearest, int(cost[node + dc]), int(cost[node + dr * columns]))
+            new_g = g + STEP[side] * dearest
             old = label[there]
             if base - new_g <= old + 1:
                 continue
@@ -226,7 +236,7 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
             )
             if new_g + h >= upper:
                 continue
-            label[there] = base - new_g
+            label[there], came[there] = base - new_g, side
             number = (new_g + h) >> shift
             if known and not old & 1 and (base - old + h) >> shift == number:
                 continue
@@ -289,10 +299,9 @@ def way_cost(cost, wall, columns, path, first, last):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def so_far(cost, wall, columns, start, diagonals, run):
-    """The way as the search has made it shorter so far, which still goes on: flat indices."""
+    """The way as a search that has beaten it, and still goes on, has made it shorter so far: flat
+    indices."""
     count, node = run.state[COUNT], run.state[MEETING]
-    if node < 0:
-        return run.path[:count].copy()
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
     if count == 0 or node == run.path[count - 1]:
         return beginning

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.frontier import cells_of
 from planners.search import DIAGONAL, STRAIGHT
 
 
@@ -77,18 +78,17 @@ class Step:
     plan: MultiPath | None
 
 
-def way_plan(cells: NDArray[np.int32], diagonal: int, cost: float, least: float) -> MultiPath:
+def way_plan(path: NDArray[np.int32], columns: int, cost: float, least: float) -> MultiPath:
     """A plan without any abstraction: a way from cell to cell.
 
-    `cells` is int32 [n, 2], `diagonal` of whose steps are diagonal. `cost` is what the search says
+    `path` is flat indices int32 [n] into a map of so many columns. `cost` is what the search says
     of it (10 000 a straight step over a cell of cost 1), `least` a proven lower bound of that.
     Where believed obstacles are crossed, `length` counts them as what they cost.
     """
-    plan = np.zeros((len(cells), 3), np.int32)
-    plan[:, 1:] = cells
+    plan, diagonal = cells_of(path, columns, 1)
     # Counted rather than summed, so that equal ways have equal lengths to the last bit.
     diagonal = int(diagonal)  # numba leaves it an int, plain numpy an int64
-    straight = max(len(cells) - 1, 0) - diagonal
+    straight = max(len(path) - 1, 0) - diagonal
     length = straight + diagonal * math.sqrt(2)
     dear = cost - (straight * STRAIGHT + diagonal * DIAGONAL)
     if dear > 0:

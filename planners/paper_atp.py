@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "4c03347766e3"
+CALLED = "17b2963ec680"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

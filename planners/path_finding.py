@@ -154,7 +154,7 @@ def _read_back(
 
 
 def _path(cells: NDArray[np.int32], columns: int, cost: int, expansions: int) -> Path:
-    pairs, diagonal = cells_of(cells, columns)
+    pairs, diagonal = cells_of(cells, columns, 0)
     # Counted rather than summed, so that equal ways have equal lengths to the last bit.
     return Path(pairs, len(pairs) - 1 - diagonal + diagonal * math.sqrt(2), cost, expansions)
 

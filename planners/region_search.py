@@ -10,11 +10,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.blocks import ALL, EXPANDED, MOST, SIDE, TOUCHED, know, region_of
-from planners.frontier import detour, flood, least_way, next_base
+from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region_of
+from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "f25dedbf315a"
+CALLED = "4600a2d5c015"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
@@ -71,7 +71,8 @@ def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, r
     state, work = run.state, 0
     for node in (start, goal):
         block = node // columns // SIDE * across + node % columns // SIDE
-        work += know(cost, wall, dearest, columns, block, regions)
+        if regions.count[block] == UNKNOWN:
+            work += part(cost, wall, dearest, columns, block, regions)
     base = next_base(run)
     for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
         run.bucket[place & (BUCKETS - 1)] = NOTHING
@@ -141,7 +142,8 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
     """
     across = (columns + SIDE - 1) // SIDE
     tall, count = regions.count.size // across, regions.count.size
-    label, bucket, entry, behind, edge = run.label, run.bucket, run.entry, run.behind, regions.edge
+    label, bucket, entry, behind = run.label, run.bucket, run.entry, run.behind
+    counts, masks, edge = regions.count, regions.mask, regions.edge
     pins, bends, doors, parents = run.pin, run.bend, run.door, run.parent
     cheapest = run.cheapest
     state, base, work, found = run.state, run.clock[0], 0, NO_PATH
@@ -179,31 +181,45 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
         pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
         pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
         door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
+        door_first = left if upright else top
         bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
-        inside, reached, mask = np.int64(0), np.int64(0), regions.mask[here]
-        if mask != ALL:  # what stands in the block may be in the way
-            inside = (pin_row - top) * SIDE + pin_column - left
-            reached = flood(mask, inside, diagonals, waves)
-            work += reached * TOUCHED
+        inside, reached, mask = (pin_row - top) * SIDE + pin_column - left, np.int64(0), masks[here]
+        edges = np.int64(edge[here])
         for side in range(4):
-            mine = (np.int64(edge[here]) >> (SIDE * side)) & 0xFF
+            mine = (edges >> (SIDE * side)) & 0xFF
             if mine == 0:
                 continue
-            if side == 0:
-                there, line, outside = block - across, top - 1, top == 0
-            elif side == 1:
-                there, line = block + across, top + SIDE
-                outside = block_row + 1 == tall
-            elif side == 2:
-                there, line, outside = block - 1, left - 1, left == 0
+            # Ahead is across the border, along is on it.
+            ahead_is_row = side < 2
+            if ahead_is_row:
+                corner, first, at, most, apart = top, left, block_row, tall, across
+                pin_ahead, pin_along, bend_ahead, bend_along = (
+                    pin_row,
+                    pin_column,
+                    bend_row,
+                    bend_column,
+                )
+                goal_ahead, goal_along = goal_row, goal_column
             else:
-                there, line = block + 1, left + SIDE
-                outside = block_column + 1 == across
-            if outside:
-                continue
-            first = left if side < 2 else top
-            work += know(cost, wall, dearest, columns, there, regions)
-            for number in range(np.int64(regions.count[there])):
+                corner, first, at, most, apart = left, top, block_column, across, 1
+                pin_ahead, pin_along, bend_ahead, bend_along = (
+                    pin_column,
+                    pin_row,
+                    bend_column,
+                    bend_row,
+                )
+                goal_ahead, goal_along = goal_column, goal_row
+            if side & 1:
+                if at + 1 == most:
+                    continue
+                line, there = corner + SIDE, block + apart
+            else:
+                if at == 0:
+                    continue
+                line, there = corner - 1, block - apart
+            if counts[there] == UNKNOWN:
+                work += part(cost, wall, dearest, columns, there, regions)
+            for number in range(np.int64(counts[there])):
                 region = number * count + there
                 join = mine & (np.int64(edge[region]) >> (SIDE * (side ^ 1)))
                 if join == 0:
@@ -212,57 +228,54 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                 known = old > base - SPAN
                 if known and old & 1:
                     continue
-                from_row, from_column, from_g, from_cell = bend_row, bend_column, bend_g, bend
-                row, column = line, line
-                for turn in range(2):
-                    if side < 2:
-                        place = crossing(from_row, from_column, goal_row, goal_column, line)
-                    else:
-                        place = crossing(from_column, from_row, goal_column, goal_row, line)
-                    place = first + NEAREST[join, min(max(place - first, 0), SIDE - 1)]
-                    if side < 2:
-                        column = place
-                    else:
-                        row = place
-                    if turn == 1 or bend == pin:
-                        break
+                place = crossing(bend_ahead, bend_along, goal_ahead, goal_along, line) - first
+                place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
+                from_ahead, from_along, from_g, from_cell = bend_ahead, bend_along, bend_g, bend
+                if bend != pin:
+                    to_ahead, to_along = line, first + place
+                    if upright != ahead_is_row:
+                        to_ahead, to_along = to_along, to_ahead
                     if upright:
-                        seen = _in_sight(door, left, pin_row, bend_row, bend_column, row, column)
+                        seen = _in_sight(
+                            door, door_first, pin_row, bend_row, bend_column, to_ahead, to_along
+                        )
                     else:
-                        seen = _in_sight(door, top, pin_column, bend_column, bend_row, column, row)
-                    if seen:
-                        break
-                    from_row, from_column, from_g, from_cell = pin_row, pin_column, pin_g, pin
-                g = from_g + least_way(row - from_row, column - from_column, diagonals)
-                h = least_way(row - goal_row, column - goal_column, diagonals)
-                exit = np.int64(0)
-                if reached > 0:
-                    start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
-                    exit = start + (place - first) * stride
+                        seen = _in_sight(
+                            door, door_first, pin_column, bend_column, bend_row, to_ahead, to_along
+                        )
+                    if not seen:
+                        place = crossing(pin_ahead, pin_along, goal_ahead, goal_along, line) - first
+                        place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
+                        from_ahead, from_along, from_g, from_cell = pin_ahead, pin_along, pin_g, pin
+                along = first + place
+                g = from_g + least_way(line - from_ahead, along - from_along, diagonals)
+                h = least_way(line - goal_ahead, along - goal_along, diagonals)
+                start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
+                exit = start + place * stride
+                if reached == 0 and not is_clear(mask, inside, exit):
+                    reached = flood(mask, inside, diagonals, waves)
+                    work += reached * TOUCHED
                 if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
                     # The way goes round something within the block, and may bend anywhere.
-                    least, best = SPAN, np.int64(0)
+                    least = SPAN
                     for place in range(SIDE):
                         if (join >> place) & 1 == 0:
                             continue
                         more = detour(waves, reached, inside, start + place * stride, diagonals)
-                        row = line if side < 2 else first + place
-                        column = first + place if side < 2 else line
                         g = pin_g + STRAIGHT * more
-                        g += least_way(row - pin_row, column - pin_column, diagonals)
-                        h = least_way(row - goal_row, column - goal_column, diagonals)
+                        g += least_way(line - pin_ahead, first + place - pin_along, diagonals)
+                        h = least_way(line - goal_ahead, first + place - goal_along, diagonals)
                         if g + h < least:
-                            least, best = g + h, first + place
-                    row = line if side < 2 else best
-                    column = best if side < 2 else line
-                    h = least_way(row - goal_row, column - goal_column, diagonals)
-                    g, from_cell = least - h, row * columns + column
+                            least, along = g + h, first + place
+                    h = least_way(line - goal_ahead, along - goal_along, diagonals)
+                    g, from_cell = least - h, np.int64(NOTHING)
                 f = g + h * percent // 100
                 if known and f >= cheapest[region]:
                     continue
                 label[region], cheapest[region] = base - g, f
-                pins[region] = row * columns + column
-                bends[region] = from_cell
+                cell = line * columns + along if ahead_is_row else along * columns + line
+                pins[region] = cell
+                bends[region] = cell if from_cell < 0 else from_cell
                 doors[region] = join | (side ^ 1) << SIDE
                 parents[region] = here
                 if unused >= 0:

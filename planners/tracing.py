@@ -8,20 +8,12 @@ which takes some forty operations.
 import numpy as np
 from numba import njit
 
-from planners.blocks import (
-    ALL,
-    FIRST_COLUMN,
-    FIRST_ROW,
-    LAST_BIT,
-    LAST_ROW,
-    SIDE,
-    ZERO,
-)
-from planners.frontier import ONE, detour, flood, least_way, step_cost, wave
+from planners.blocks import FIRST_COLUMN, FIRST_ROW, LAST_BIT, LAST_ROW, SIDE, ZERO
+from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost, wave
 from planners.region_search import LAST_REGION
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "e178e059d0a8"
+CALLED = "f7d40f7b7d34"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -47,64 +39,66 @@ def pins_of(columns, goal, diagonals, regions, run):
         way[place] = region
         region = run.parent[region]
     across, blocks, touched = (columns + SIDE - 1) // SIDE, regions.count.size, 0
+    masks, bends, entered = regions.mask, run.bend, run.pin
     coming, going = np.empty(SIDE * SIDE + 1, np.uint64), np.empty(SIDE * SIDE + 1, np.uint64)
-    from_cell = to_cell = np.int64(0)
     for turn in range(TAUT):
         for step in range(1, count - 1):
             place = step if turn % 2 == 1 else count - 1 - step
-            here, block = way[place], way[place] % blocks
-            side = way[place - 1] % blocks - block
+            here, behind = way[place], way[place - 1]
+            block, other_block = here % blocks, behind % blocks
+            side = other_block - block
             # At first from where the way bends, which may lie several regions back.
-            bent = turn > 0 or run.bend[here] == run.pin[here]
-            before = np.int64(pins[place - 1] if bent else run.bend[here])
+            bent = turn > 0 or bends[here] == entered[here]
+            before = np.int64(pins[place - 1] if bent else bends[here])
             after = np.int64(pins[place + 1])
-            first = block // across * SIDE * columns + block % across * SIDE
-            mask, other = regions.mask[here], regions.mask[way[place - 1]]
+            before_row, after_row = before // columns, after // columns
+            before_column, after_column = before - before_row * columns, after - after_row * columns
+            top = block // across * SIDE
+            left = (block - top // SIDE * across) * SIDE
+            mask, other = masks[here], masks[behind]
+            beside = SIDE * (SIDE - 1)  # from a cell to the one beside it in the block before
             if side == -across:
-                join, stride = mask & FIRST_ROW & (other >> LAST_ROW), 1
+                join, stride, first = mask & FIRST_ROW & (other >> LAST_ROW), 1, 0
             elif side == across:
-                join, stride = (mask >> LAST_ROW) & FIRST_ROW & other, 1
-                first += (SIDE - 1) * columns
+                join, stride, first = (mask >> LAST_ROW) & FIRST_ROW & other, 1, beside
+                beside = -beside
             elif side == -1:
-                join, stride = mask & FIRST_COLUMN & (other >> LAST_BIT), columns
+                join, stride, first = mask & FIRST_COLUMN & (other >> LAST_BIT), SIDE, 0
+                beside = SIDE - 1
             else:
-                join, stride = (mask >> LAST_BIT) & FIRST_COLUMN & other, columns
-                first += SIDE - 1
+                beside = 1 - SIDE
+                join, stride, first = (mask >> LAST_BIT) & FIRST_COLUMN & other, SIDE, SIDE - 1
             # What stands within the two blocks may make one cell a longer way than another.
-            top, left = block // across * SIDE, block % across * SIDE
-            came = went = np.int64(0)
-            if bent and other != ALL:
-                r = before // columns - way[place - 1] % blocks // across * SIDE
-                c = before % columns - way[place - 1] % blocks % across * SIDE
-                from_cell = r * SIDE + c
-                came = flood(other, from_cell, diagonals, coming)
-            if mask != ALL:
-                r = min(max(after // columns - top, 0), SIDE - 1)
-                c = min(max(after % columns - left, 0), SIDE - 1)
-                to_cell = r * SIDE + c
-                went = flood(mask, to_cell, diagonals, going)
-            touched += came + went
-            least = SPAN
+            other_top = top - SIDE if side == -across else top + SIDE if side == across else top
+            other_left = left - SIDE if side == -1 else left + SIDE if side == 1 else left
+            from_cell = (before_row - other_top) * SIDE + before_column - other_left
+            to_cell = min(max(after_row - top, 0), SIDE - 1) * SIDE
+            to_cell += min(max(after_column - left, 0), SIDE - 1)
+            came, went, least = np.int64(0), np.int64(0), SPAN
             for along in range(SIDE):
-                bit = along if stride == 1 else along * SIDE
+                bit = along * stride
                 if (join >> np.uint64(bit)) & ONE == ZERO:
                     continue
                 touched += 1
-                cell = first + along * stride
-                row, column = cell // columns, cell % columns
-                there = least_way(row - before // columns, column - before % columns, diagonals)
-                there += least_way(row - after // columns, column - after % columns, diagonals)
-                inside = (row - top) * SIDE + column - left
+                inside = first + bit
+                row, column = top + inside // SIDE, left + inside % SIDE
+                there = least_way(row - before_row, column - before_column, diagonals)
+                there += least_way(row - after_row, column - after_column, diagonals)
+                if there >= least:
+                    continue
+                if went == 0 and not is_clear(mask, to_cell, inside):
+                    went = flood(mask, to_cell, diagonals, going)
+                    touched += went
                 if went > 0:
                     there += STRAIGHT * detour(going, went, to_cell, inside, diagonals)
+                if bent and came == 0 and not is_clear(other, from_cell, inside + beside):
+                    came = flood(other, from_cell, diagonals, coming)
+                    touched += came
                 if came > 0:
-                    # The cell beside it, in the block before.
-                    beside = inside + (56 if side == -across else -56 if side == across
-                                       else 7 if side == -1 else -7)  # fmt: skip
-                    there += STRAIGHT * detour(coming, came, from_cell, beside, diagonals)
+                    there += STRAIGHT * detour(coming, came, from_cell, inside + beside, diagonals)
                 if there < least:
                     least = there
-                    pins[place] = cell
+                    pins[place] = row * columns + column
     return pins, way, touched
 
 

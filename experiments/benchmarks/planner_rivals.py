@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners import Grid, ara, paper_atp, steps
-from planners.frontier import cells_of, path_to
+from planners.frontier import path_to
 from planners.grids import endpoints
 from planners.improving import DONE, GAIN, MEETING, UPPER, begin, new_run, search
 from planners.multipath import NO_WAY, Step, way_plan
@@ -36,7 +36,8 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
     first, last, _ = endpoints(grid, start, goal, 8)
     columns, run, known = grid.shape[1], new_run(*grid.shape), float(SPAN)
     for weight in weights:
-        run.norm[:] = [round(weight * each) for each in least_norm(True)]
+        least_norm(True, run.norm)
+        run.norm[:] = np.round(weight * run.norm)
         begin(grid.cost, columns, first, last, int(known), weight == 1.0, run)
         found = OUT_OF_BUDGET
         while found == OUT_OF_BUDGET:
@@ -45,7 +46,7 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
             if found == DONE and run.state[MEETING] >= 0:
                 known = float(run.state[UPPER] - run.state[GAIN])
                 way = path_to(grid.cost, grid.wall, columns, first, last, True, run)
-                plan = way_plan(*cells_of(way, columns), known, known / weight)
+                plan = way_plan(way, columns, known, known / weight)
             yield Step(float(taken), plan)
     if known == SPAN:
         yield Step(0.0, NO_WAY)

@@ -1,11 +1,12 @@
 """Regions of blocks: exactly what hangs together, by flood fill as by words."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from planners.blocks import MOST, SIDE, UNKNOWN, know, new_regions
+from planners.blocks import MOST, SIDE, UNKNOWN, new_regions, part
 from planners.map_features import features
 from planners.search import UNLIMITED
 from sensing import clustered, maze, rooms, uniform
@@ -20,7 +21,7 @@ def regions_of(free):
     )
     across, found = -(-columns // SIDE), set()
     for block in range(regions.count.size):
-        know(cost, 0, 1, columns, block, regions)
+        part(cost, 0, 1, columns, block, regions)
         top, left = block // across * SIDE, block % across * SIDE
         for k in range(regions.count[block]):
             mask = int(regions.mask[k * regions.count.size + block])
@@ -65,3 +66,11 @@ def test_clustering_tells_walls_from_independent_obstacles():
         found[name] = clustering
     assert found["independent"] < 0.05
     assert min(found["rooms"], found["clustered"], found["maze"]) > 0.2
+
+
+@pytest.mark.parametrize("size", [72, 128, 256, 512, 1024])
+def test_walls_at_even_distances_are_neither_all_nor_none_of_what_is_looked_at(size):
+    free = rooms(size, np.random.default_rng(0))
+    density, clustering, _ = features(free.view(np.uint8).reshape(-1), 0, 1, size, 64)
+    assert abs(density - (~free).mean()) < 0.02
+    assert clustering > 0.2

@@ -30,16 +30,20 @@ def queries(draw):
     return free
 
 
-def found(cost, wall, columns, norm, exact, grain, again=None):
-    """Cost of the way from the first to the last cell, or None; searched `grain` by `grain`."""
-    run, goal = new_run(cost.size // columns, columns), cost.size - 1
-    run.norm[:] = norm
-    begin(cost, columns, 0, goal, SPAN, exact, run)
+def found(cost, wall, columns, grain, scales=()):
+    """Cost of the way from the first to the last cell, or None; searched `grain` by `grain`, by the
+    exact norm or by the expected one, in two scales."""
+    run, goal, again = new_run(cost.size // columns, columns), cost.size - 1, scales[1:]
+    if scales:
+        expected_norm(0.3, scales[0], True, run.norm)
+    else:
+        least_norm(True, run.norm)
+    begin(cost, columns, 0, goal, SPAN, not scales, run)
     while search(cost, wall, columns, goal, True, run, grain)[0] != DONE:
-        if again is not None:
-            run.norm[:] = again
+        for scale in again:
+            expected_norm(0.3, scale, True, run.norm)
             reweigh(columns, goal, run)
-            again = None
+        again = ()
     if run.state[MEETING] < 0:
         return None
     told = int(run.state[UPPER] - run.state[GAIN])
@@ -53,7 +57,7 @@ def found(cost, wall, columns, norm, exact, grain, again=None):
 def test_with_an_exact_norm_the_way_is_the_shortest_however_often_it_is_interrupted(free, grain):
     best = astar(free, (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
     cost = np.ascontiguousarray(free).view(np.uint8).reshape(-1)
-    way = found(cost, 0, free.shape[1], least_norm(True), True, grain)
+    way = found(cost, 0, free.shape[1], grain)
     assert way == (None if best is None else best.cost)
 
 
@@ -62,8 +66,7 @@ def test_with_an_exact_norm_the_way_is_the_shortest_however_often_it_is_interrup
 def test_any_norm_finds_a_way_where_there_is_one(free, grain, scale, later):
     best = astar(free, (0, 0), (free.shape[0] - 1, free.shape[1] - 1))
     cost = np.ascontiguousarray(free).view(np.uint8).reshape(-1)
-    norms = [expected_norm(0.3, each, True) for each in (scale, scale * later)]
-    way = found(cost, 0, free.shape[1], norms[0], False, grain, again=norms[1])
+    way = found(cost, 0, free.shape[1], grain, (scale, scale * later))
     assert (way is None) == (best is None)
     assert best is None or (way is not None and best.cost <= way)
 
@@ -75,5 +78,5 @@ def test_cells_that_are_dear_do_not_overtake_each_other_in_the_ring(seed, grain)
     cost = rng.choice(np.array([1, 1, 1, 7, 250, 255], np.uint8), (30, 40))
     cost[0, 0] = cost[-1, -1] = 1
     best = route(cost, (0, 0), (29, 39))
-    way = found(cost.reshape(-1), 255, 40, least_norm(True), True, grain)
+    way = found(cost.reshape(-1), 255, 40, grain)
     assert way == (None if best is None else best.cost)

@@ -14,21 +14,29 @@ DENSITIES = st.floats(0.0, 0.6)
 DISTANCES = st.integers(-2000, 2000)
 
 
-def cost(rows, columns, norm):
-    return int(estimated(rows, columns, np.array(norm)))
+def least(rows, columns, diagonals):
+    norm = np.zeros(6, np.int64)
+    least_norm(diagonals, norm)
+    return int(estimated(rows, columns, norm))
+
+
+def expected(rows, columns, density, diagonals=True):
+    norm = np.zeros(6, np.int64)
+    expected_norm(density, 1.0, diagonals, norm)
+    return int(estimated(rows, columns, norm))
 
 
 @given(DENSITIES, DISTANCES, DISTANCES, st.booleans())
 def test_a_way_among_obstacles_costs_no_less_than_on_an_empty_floor(p, rows, columns, diagonals):
-    least = cost(rows, columns, least_norm(diagonals))
     slack = 2 * (abs(rows) + abs(columns))  # planes are rounded
-    assert cost(rows, columns, expected_norm(p, 1.0, diagonals)) >= least - slack
-    assert least == cost(columns, -rows, least_norm(diagonals))
+    empty = least(rows, columns, diagonals)
+    assert expected(rows, columns, p, diagonals) >= empty - slack
+    assert empty == least(columns, -rows, diagonals)
 
 
 @given(DENSITIES, DENSITIES, DISTANCES, DISTANCES)
 def test_the_denser_the_floor_the_dearer_the_way(one, other, rows, columns):
-    sparse, dense = (cost(rows, columns, expected_norm(p, 1.0, True)) for p in sorted((one, other)))
+    sparse, dense = (expected(rows, columns, p) for p in sorted((one, other)))
     assert dense >= sparse - 2 * (abs(rows) + abs(columns))
 
 
@@ -42,5 +50,5 @@ def test_ways_cost_what_the_norm_expects(density, slope):
         found = astar(free, start, goal)
         if found is not None:
             down, across = goal[0] - start[0], goal[1] - start[1]
-            ratios.append(found.cost / cost(down, across, expected_norm(density, 1.0, True)))
+            ratios.append(found.cost / expected(down, across, density))
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.025)
