@@ -157,7 +157,7 @@ def with_room(row, used, room):
 @njit(cache=True, nogil=True, error_model="numpy")
 def path_to(cost, wall, columns, start, node, diagonals, work):
     """Read the path from `start` to `node` back from the labels of the last search."""
-    rows, base, label = cost.size // columns, work.clock[0], work.label
+    rows, label = cost.size // columns, work.label
     path = np.empty(64, np.int32)
     count, row, column = 0, node // columns, node % columns
     while True:
@@ -167,7 +167,9 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
         count += 1
         if node == start:
             return path[:count][::-1].copy()
-        best, best_label, best_dr, best_dc = node, base - SPAN, 0, 0
+        # Every label is the length of a real way, so the best neighbour is closer by its step, but
+        # for the one by which labels of closed nodes are less.
+        best, best_label, best_dr, best_dc = node, label[node] - 2, 0, 0
         for dr in range(-1, 2):
             if row + dr < 0 or row + dr >= rows:
                 continue
@@ -178,10 +180,9 @@ def path_to(cost, wall, columns, start, node, diagonals, work):
                     continue
                 there = node + dr * columns + dc
                 least = DIAGONAL if dr != 0 and dc != 0 else STRAIGHT
-                if label[there] <= label[node] or label[there] - least <= best_label:
+                if label[there] - least <= best_label:
                     continue
                 step = step_cost(cost, wall, columns, there, -dr, -dc)
-                # Every label is the length of a real way, so the best neighbour is closer by it.
                 if step > 0 and label[there] - step > best_label:
                     best, best_label, best_dr, best_dc = there, label[there] - step, dr, dc
         node, row, column = best, row + best_dr, column + best_dc

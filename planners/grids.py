@@ -15,7 +15,7 @@ from planners.path_finding import Cell, flat, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "fa0e55148586"
+CALLED = "58d22540ba7d"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much

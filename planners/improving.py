@@ -28,7 +28,7 @@ from planners.search import (
     WALL,
 )
 
-CALLED = "51b6350f92ee"
+CALLED = "aa0832599406"
 
 DONE = 0
 BUCKETS = 1 << 13

@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "17b2963ec680"
+CALLED = "fd5e1573cbf4"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

@@ -13,7 +13,7 @@ from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost
 from planners.region_search import LAST_REGION
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "f7d40f7b7d34"
+CALLED = "b4350b0318e8"
 
 TAUT = 2
 """How often pins are drawn taut."""
