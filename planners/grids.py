@@ -19,7 +19,7 @@ CALLED = "58d22540ba7d"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much
-_SAMPLE = 256  # blocks from which density and clustering are taken
+_SAMPLE = 128  # blocks from which density and clustering are taken
 
 
 def _odds_costs() -> NDArray[np.uint8]:
