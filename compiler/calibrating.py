@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from anytime.profiles import Profile
 from anytime.programs import Program
 from compiler.certificates import best_so_far
+from compiler.costs import stretched
 from compiler.division import Frontier, divide, expected_quality, moments_within, value_of
 from compiler.intervals import mean_interval
 from compiler.objectives import Objective
@@ -80,13 +81,16 @@ def calibrate(
     """The divisions of a frontier that stand when they are lived again, and what they may promise.
 
     Cross-fitting: each fold of the problems lives (`compiler.replaying`) the divisions that were
-    chosen without it. One that is worse there than another with less time is dropped, for tables,
-    which are averages over problems, can be mistaken. Isotonic regression of the means over the
-    tables' levels gives the promises.
+    chosen without it. One that is worse there than another with less time gives way to that other
+    with more of it, for tables, which are averages over problems, can be mistaken. Isotonic
+    regression of the means over the tables' levels gives the promises.
     """
     knots = _knots(frontier, KNOTS * DIVIDED // max(DIVIDED, len(program.calls)))
     values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
-    return _calibrated(frontier, knots, values)
+    standing = _standing(values)
+    frontier, knots, values = _stretched(frontier, knots, values, standing, replay)
+    calibration = _isotonic(frontier.promised[knots], values)
+    return calibration.applied(frontier), calibration
 
 
 def calibrate_by_running(
@@ -123,21 +127,35 @@ def calibrate_by_running(
     return calibration.applied(found), calibration
 
 
-def _calibrated(
-    frontier: Frontier, knots: NDArray[np.intp], values: Floats
-) -> tuple[Frontier, Calibration]:
-    """From what the tables say, and qualities [P, K] lived at some places of the frontier."""
-    standing = _standing(values)
+def _stretched(
+    frontier: Frontier,
+    knots: NDArray[np.intp],
+    values: Floats,
+    standing: NDArray[np.bool_],
+    replay: Replay,
+) -> tuple[Frontier, NDArray[np.intp], Floats]:
+    """The frontier without the rows of knots that do not stand; where the last division before that
+    does gains by more time, with that in their place. Then the knots, and what is lived at them."""
     knot_of = np.searchsorted(knots, np.arange(len(frontier.budgets))).clip(0, len(knots) - 1)
-    kept = standing[knot_of]
-    calibration = _isotonic(frontier.promised[knots[standing]], values[:, standing])
-    frontier = replace(
-        frontier,
-        budgets=frontier.budgets[kept],
-        shares=frontier.shares[kept],
-        promised=frontier.promised[kept],
+    kept, standing = standing[knot_of], standing.copy()
+    shares, promised, values = frontier.shares.copy(), frontier.promised.copy(), values.copy()
+    best = 0
+    for column, knot in enumerate(knots):
+        if standing[column]:
+            best = knot
+            continue
+        budget = float(frontier.budgets[knot])
+        given = stretched(replay.tables, shares[best].tolist(), budget)
+        row = [given.get(table.label, 0.0) for table in replay.tables]
+        level = expected_quality(replay.tables, moments_within(replay.tables, row))
+        if level > promised[best]:
+            shares[knot], promised[knot], best = row, level, knot
+            values[:, column] = replay.achieved([*given.values()], budget)
+            kept[knot] = standing[column] = True
+    found = replace(
+        frontier, budgets=frontier.budgets[kept], shares=shares[kept], promised=promised[kept]
     )
-    return calibration.applied(frontier), calibration
+    return found, (np.cumsum(kept) - 1)[knots[standing]], values[:, standing]
 
 
 def as_tables_say(
@@ -210,9 +228,9 @@ def _unseen(
         for column, budget in enumerate(budgets):
             # Where the others say that there is no result yet, all of them had one.
             source = chosen if chosen.index(budget) >= 0 else frontier
-            shares = source.shares[source.index(budget)].tolist()
-            shares[-1] = budget - sum(shares[:-1])
-            values[held, column] = replay.achieved(shares, float(budget), held)
+            row = source.shares[source.index(budget)].tolist()
+            shares = stretched(replay.tables, row, float(budget))
+            values[held, column] = replay.achieved([*shares.values()], float(budget), held)
     return values
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from anytime.errors import AnytimeError
+from anytime.joins import Best, Rule
 from anytime.machines import Machine
 from anytime.modules import Module
 from anytime.profiles import Profile
-from anytime.programs import Program, program_of
+from anytime.programs import Join, Program, program_of
 from compiler.adaptive import adapt
 from compiler.calibrating import as_tables_say, calibrate
 from compiler.compiled import CompiledProgram
@@ -36,9 +37,9 @@ def compile(
     objective: what a division is chosen for, see `compiler.expected` and its like. adaptive: decide
     each share when its call begins, by what was achieved before, and whether it goes on after each
     of its results, by what it shows, where that is worth more.
-    The result is a contract program with a profile of its own. The promises of a program of plain
-    calls are cross-fitted over problems, with 95 % intervals; those of others are what the tables
-    say, with intervals by bootstrap over problems.
+    The result is a contract program with a profile of its own. The promises of a program of
+    calls and alternatives are cross-fitted over problems, with 95 % intervals; those of others are
+    what the tables say, with intervals by bootstrap over problems.
     Raises AnytimeError for a missing or unsuitable profile, before any search.
     """
     if isinstance(program, Module):
@@ -59,16 +60,16 @@ def compile(
         )
     steps = guards_of(profiles)
     replay = None
-    if _plain(program) and objective == EXPECTED:
+    if _in_a_row(program, Best) and objective == EXPECTED:
         # On the machine of the profiles, so that a faster one never promises less.
         there = made if machine is None else tables(program, measured)
         known = frontier if machine is None else divide(there)
         guards = guards_of(measured)
-        replay = replay_of(program, measured, guards, [t.first for t in there], seed)
+        replay = replay_of(program, measured, guards, there, seed)
         lived, calibration = calibrate(program, measured, known, replay, seed)
         frontier = lived if machine is None else calibration.applied(frontier)
         if machine is not None:
-            replay = replay_of(program, profiles, steps, [t.first for t in made], seed)
+            replay = replay_of(program, profiles, steps, made, seed)
     else:
         calibration = as_tables_say(program, profiles, frontier, objective, seed)
     policy = None
@@ -82,7 +83,7 @@ def compile(
         calibration=calibration,
         steps=steps,
         machine=" and ".join(sorted(names)),
-        regret=regret_bound(program, profiles, made) if _plain(program) else 1.0,
+        regret=regret_bound(program, profiles, made) if _in_a_row(program) else 1.0,
         objective=objective,
         policy=policy,
         replay=replay,
@@ -100,6 +101,7 @@ def _needed(program: Program, library: Mapping[str, Profile]) -> dict[str, Profi
     return {name: library[name] for name in needed}
 
 
-def _plain(program: Program) -> bool:
-    """Whether it is calls alone, one after the other."""
-    return len(program.nodes) == len(program.calls) and not program.parallels
+def _in_a_row(program: Program, *rules: type[Rule]) -> bool:
+    """Whether it is calls, and joins by these rules alone, one after the other."""
+    joins = [node for node in program.nodes if isinstance(node, Join)]
+    return not program.parallels and all(isinstance(join.rule, rules) for join in joins)

@@ -90,19 +90,19 @@ class UntilRegret:
     def _begin(self, profiles: dict[str, Profile], problems: Sequence[str]) -> None:
         some = {name: _only(profile, set(problems)) for name, profile in profiles.items()}
         made = tables(self.program, some)
-        firsts, frontier = [table.first for table in made], divide(made)
-        self._pilot = replay_of(self.program, some, guards_of(some), firsts)
+        frontier = divide(made)
+        self._pilot = replay_of(self.program, some, guards_of(some), made)
         self.problems = len(problems)
         for budget in self._budgets:
             likely = frontier.shares[frontier.budgets <= budget][-LIKELY:] / budget
-            self._choices.append(np.vstack([equal_ticks(len(firsts)), _whole(likely)]))
+            self._choices.append(np.vstack([equal_ticks(len(made)), _whole(likely)]))
 
     def _values(self, profiles: dict[str, Profile], problems: Sequence[str]) -> list[Floats]:
         """Quality of every division on some problems, [P, divisions] for each budget."""
         assert self._pilot is not None
         some = {name: _only(profile, set(problems)) for name, profile in profiles.items()}
         pilot = self._pilot
-        replay = replay_of(self.program, some, pilot.steps, pilot.firsts, self.problems)
+        replay = replay_of(self.program, some, pilot.steps, pilot.tables, self.problems)
         values: list[Floats] = []
         for budget, choices in zip(self._budgets, self._choices, strict=True):
             rows = [replay.achieved((shares * budget).tolist(), budget) for shares in choices]

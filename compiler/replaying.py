@@ -9,15 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.joins import Best
 from anytime.profiles import Profile, Recording
-from anytime.programs import Program, upstream
+from anytime.programs import Join, Program, upstream
 from anytime.sampling import CHANGES
 from anytime.strata import stratum_weights
+from compiler.executing import unwanted
 from compiler.guarding import Steps
+from compiler.tables import Table
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -31,7 +35,8 @@ class Records:
     """The recorded runs of one module as arrays: P problems, at most R runs of C changes each.
 
     inputs: parameters that other modules feed. fed: [P, R, inputs] quality of what arrived there.
-    seconds: [P, R, C] of each change, inf beyond the last. qualities: [P, R, C].
+    seconds: [P, R, C] of each change, inf beyond the last. qualities, estimates: [P, R, C]; of a
+    module without estimates these are 0.
     counts: [P, R] changes. ends: [P, R] seconds at which a run was complete, inf if it was cut.
     there: [P, R] whether there is such a run; none on a problem for which nothing ever arrived.
     """
@@ -39,6 +44,7 @@ class Records:
     inputs: tuple[str, ...]
     seconds: Floats
     qualities: Floats
+    estimates: Floats
     fed: Floats
     counts: Indices
     ends: Floats
@@ -50,15 +56,16 @@ class Replay:
     """The recordings of a program's modules, ready to be lived again.
 
     problems: keys of the P problems, one for each row of what `achieved` returns.
-    records: by module. chosen: [calls, P, lives], numbers in [0, 1) that decide which run is
-    taken; the same in every life, so that divisions are compared on common luck.
+    records: by module. tables: of the program's nodes, for what a call needs to have a first
+    result. chosen: [calls, P, lives], numbers in [0, 1) that decide which run is taken; the same in
+    every life, so that divisions are compared on common luck.
     """
 
     program: Program
     problems: tuple[str, ...]
     records: Mapping[str, Records]
     steps: Mapping[str, Steps]
-    firsts: tuple[float, ...]
+    tables: tuple[Table, ...]
     chosen: Floats
 
     def achieved(
@@ -67,41 +74,54 @@ class Replay:
         """Quality at the end of the budget on each problem, [P] or [rows]; 0 for no result.
 
         shares: seconds of each call, as `CompiledProgram.stages` has them: time that is left
-        flows on, and a late first result is waited for.
+        flows on, a late first result is waited for, and an alternative without time is not run.
         """
         rows = np.arange(len(self.problems)) if rows is None else rows
         lives = self.chosen.shape[2]
         problem = np.repeat(rows, lives)
-        now = np.zeros(len(problem))
-        alive = np.ones(len(problem), dtype=bool)
-        delivered: dict[str, Floats] = {}
-        share_end = 0.0
-        for place, call in enumerate(self.program.calls):
-            records = self.records[call.module.name]
-            fed = {name: delivered[source.label] for name, source in upstream(call).items()}
+        labels = [call.label for call in self.program.calls]
+        skipped = unwanted(self.program, self.tables, dict(zip(labels, shares, strict=True)))
+        firsts = {t.label: t.first for t in self.tables if not t.rule and t.label not in skipped}
+        nothing = _Delivered(np.zeros(len(problem)), np.zeros(len(problem)), problem < 0)
+        delivered: dict[str, _Delivered] = {}
+        now, share_end = np.zeros(len(problem)), 0.0
+        for call in self.program.nodes:
+            if isinstance(call, Join):
+                delivered[call.label] = _best(call, delivered)
+                continue
+            if call.label in skipped:
+                delivered[call.label] = nothing
+                continue
+            place = labels.index(call.label)
+            records, first = self.records[call.module.name], firsts.pop(call.label)
+            sources = upstream(call)
+            fed = {name: delivered[source.label].quality for name, source in sources.items()}
+            alive = np.ones(len(problem), dtype=bool)
+            for source in sources.values():
+                alive &= delivered[source.label].there
             run = _drawn(records, problem, fed, self.chosen[place, rows].ravel())
             seconds = records.seconds[problem, run]
             counts = records.counts[problem, run]
             share_end += shares[place]
-            last = place == len(self.program.calls) - 1
-            hard = budget - sum(self.firsts[place + 1 :])
+            last, hard = not firsts, budget - sum(firsts.values())
             if last and call.module.generator and not call.module.contract:
                 count = _averaged(now, seconds, counts, budget)
             elif last:
                 count = (now[:, None] + seconds <= budget + 1e-9).sum(axis=1)
             elif call.module.contract:
-                ends = np.maximum(share_end, np.minimum(now + self.firsts[place], hard))
+                ends = np.maximum(share_end, np.minimum(now + first, hard))
                 count = (seconds <= (ends - now)[:, None] + EPSILON).sum(axis=1)
             elif call.module.generator and self.steps[call.module.name].median:
                 count = self._guarded(call.module.name, now, seconds, share_end, hard)
             else:
-                ends = np.maximum(share_end, np.minimum(now + self.firsts[place], hard))
+                ends = np.maximum(share_end, np.minimum(now + first, hard))
                 count = (now[:, None] + seconds < ends[:, None]).sum(axis=1) + 1
                 count[now >= ends] = 0
             count = np.minimum(count, counts)
             alive &= count > 0
             at = np.maximum(count - 1, 0)
-            delivered[call.label] = records.qualities[problem, run, at]
+            told = records.estimates[problem, run, at]
+            delivered[call.label] = _Delivered(records.qualities[problem, run, at], told, alive)
             spent = np.where(alive, records.seconds[problem, run, at], 0.0)
             complete = (count == counts) & np.isfinite(records.ends[problem, run])
             # What it does after its last result, the guard ends with its share.
@@ -110,7 +130,8 @@ class Replay:
             if call.module.contract:
                 spent = np.maximum(spent, np.minimum(share_end - now, spent * 2))
             now = now + spent
-        output = np.where(alive, delivered[self.program.output.label], 0.0)
+        output = delivered[self.program.output.label]
+        output = np.where(output.there, output.quality, 0.0)
         return output.reshape(len(rows), lives).mean(axis=1)
 
     def faster(self, module: str, factor: float) -> Replay:
@@ -118,21 +139,22 @@ class Replay:
         records, steps = self.records[module], self.steps[module]
         quick = replace(records, seconds=records.seconds / factor, ends=records.ends / factor)
         pace = Steps(tuple(s / factor for s in steps.median), tuple(s / factor for s in steps.p95))
-        firsts = tuple(
-            first / factor if call.module.name == module else first
-            for call, first in zip(self.program.calls, self.firsts, strict=True)
-        )
+        tables = tuple(t.faster(factor) if t.module == module else t for t in self.tables)
         return replace(
             self,
             records={**self.records, module: quick},
             steps={**self.steps, module: pace},
-            firsts=firsts,
+            tables=tables,
         )
 
     def better(self, module: str) -> Replay:
         """The same with every result of a module better by `BETTER`, at most 1."""
         records = self.records[module]
-        good = replace(records, qualities=np.minimum(records.qualities * BETTER, 1.0))
+        good = replace(
+            records,
+            qualities=np.minimum(records.qualities * BETTER, 1.0),
+            estimates=np.minimum(records.estimates * BETTER, 1.0),
+        )
         return replace(self, records={**self.records, module: good})
 
     def longer(self, module: str) -> Replay:
@@ -147,13 +169,25 @@ class Replay:
         some = records.counts > 0
         ratio = error_ratio(float(last[some].mean()), float(half[some].mean()))
         seconds = np.concatenate([records.seconds, np.full((*some.shape, 1), np.inf)], axis=2)
-        qualities = np.concatenate([records.qualities, np.zeros((*some.shape, 1))], axis=2)
         after = records.counts[..., None]
         np.put_along_axis(seconds, after, np.where(some[..., None], 2 * times, np.inf), axis=2)
-        np.put_along_axis(qualities, after, (1 - ratio * (1 - last))[..., None], axis=2)
+        grown: list[Floats] = []
+        for values in (records.qualities, records.estimates):
+            last = np.take_along_axis(values, place, axis=2)
+            values = np.concatenate([values, np.zeros((*some.shape, 1))], axis=2)
+            np.put_along_axis(values, after, 1 - ratio * (1 - last), axis=2)
+            grown.append(values)
+        qualities, estimates = grown
         ends = np.where(some, np.maximum(records.ends, 2 * times[..., 0]), records.ends)
         counts = records.counts + some
-        more = replace(records, seconds=seconds, qualities=qualities, ends=ends, counts=counts)
+        more = replace(
+            records,
+            seconds=seconds,
+            qualities=qualities,
+            estimates=estimates,
+            ends=ends,
+            counts=counts,
+        )
         return replace(self, records={**self.records, module: more})
 
     def _guarded(
@@ -170,6 +204,27 @@ class Replay:
         stops = np.hstack([refused, np.ones((len(refused), 1), dtype=bool)])
         count = 1 + np.asarray(stops.argmax(axis=1), dtype=np.intp)
         return np.where(now < hard, count, 0)
+
+
+class _Delivered(NamedTuple):
+    """What lives have of a node, each [lives]: its quality, its estimate, and whether it came."""
+
+    quality: Floats
+    estimate: Floats
+    there: NDArray[np.bool_]
+
+
+def _best(join: Join, delivered: Mapping[str, _Delivered]) -> _Delivered:
+    """What a choice (`anytime.joins.Best`) takes in each life."""
+    assert isinstance(join.rule, Best)
+    one, other = (delivered[argument.label] for argument in join.arguments)
+    taken = one.there & ~other.there
+    taken |= one.there & ((one.estimate >= other.estimate) | (not join.rule.compare))
+    return _Delivered(
+        np.where(taken, one.quality, other.quality),
+        np.where(taken, one.estimate, other.estimate),
+        one.there | other.there,
+    )
 
 
 def _averaged(now: Floats, seconds: Floats, counts: Indices, budget: float) -> Indices:
@@ -198,13 +253,14 @@ def replay_of(
     program: Program,
     profiles: Mapping[str, Profile],
     steps: Mapping[str, Steps],
-    firsts: Sequence[float],
+    tables: Sequence[Table],
     seed: int = 0,
 ) -> Replay:
     """Arrange the recordings of a program's modules by problem.
 
-    steps, firsts: for the deadline guard, as in the compiled program. Profiles that were measured
-    on problems of their own are put side by side by chance, as if they were independent.
+    The program is one of calls and alternatives, one after the other. steps, tables: for the
+    deadline guard, as in the compiled program. Profiles that were measured on problems of their own
+    are put side by side by chance, as if they were independent.
     """
     rng = np.random.default_rng(seed)
     base = max((profile.problems for profile in profiles.values()), key=len)
@@ -223,7 +279,7 @@ def replay_of(
         [[rng.permutation(lives) for _ in range(count)] for _ in range(len(program.calls))]
     )
     chosen = (strata + rng.random(strata.shape)) / lives
-    return Replay(program, tuple(base[:count]), records, steps, tuple(firsts), chosen)
+    return Replay(program, tuple(base[:count]), records, steps, tuple(tables), chosen)
 
 
 def _records(profile: Profile, problems: Sequence[str]) -> Records:
@@ -234,7 +290,7 @@ def _records(profile: Profile, problems: Sequence[str]) -> Records:
     changes = 1 + max(max((len(run.seconds) for run in profile.recordings), default=0), 1)
     shape = (len(problems), most)
     seconds = np.full((*shape, changes), np.inf)
-    qualities = np.zeros((*shape, changes))
+    qualities, estimates = np.zeros((*shape, changes)), np.zeros((*shape, changes))
     fed = np.zeros((*shape, len(profile.inputs)))
     counts = np.zeros(shape, dtype=np.intp)
     ends = np.full(shape, np.inf)
@@ -244,11 +300,12 @@ def _records(profile: Profile, problems: Sequence[str]) -> Records:
             count = len(run.seconds)
             seconds[row, column, :count] = run.seconds
             qualities[row, column, :count] = quality
+            estimates[row, column, :count] = np.nan_to_num(run.estimates)
             fed[row, column] = [run.inputs[name] for name in profile.inputs]
             counts[row, column] = count
             ends[row, column] = run.end[0] if run.complete else np.inf
             there[row, column] = True
-    return Records(profile.inputs, seconds, qualities, fed, counts, ends, there)
+    return Records(profile.inputs, seconds, qualities, estimates, fed, counts, ends, there)
 
 
 def _drawn(records: Records, problem: Indices, fed: Mapping[str, Floats], luck: Floats) -> Indices:

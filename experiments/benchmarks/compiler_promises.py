@@ -11,8 +11,9 @@ import numpy as np
 import anytime
 from anytime import Deadline, Machine, WorkClock
 from anytime import measure as measure_profiles
-from anytime.programs import Program
-from compiler import CompiledProgram, compile
+from anytime.joins import Known
+from anytime.programs import Call, Join, Program
+from compiler import CompiledProgram, choose, compile
 from compiler import program as read
 from compiler.division import expected_quality, moments_within
 from experiments.benchmarks.figures import share_interval
@@ -95,7 +96,8 @@ def gate(fed: tuple[float, ...], traits: tuple[float, ...]) -> float:
 
 
 def family(shape: str, course: Course, join: Callable[..., float] = product) -> Program:
-    """A program of stages with one course: "pair", "chain", "tree" or "shared"."""
+    """A program of stages with one course: "pair", "chain", "tree", "shared", "either" of two
+    alternatives, or "chosen", where another stage goes on with the better of them."""
 
     def steps(place: int, fed: tuple[float, ...], problem: Case, rng: np.random.Generator):
         possible = join(fed, problem.traits) if fed else 1.0
@@ -106,7 +108,9 @@ def family(shape: str, course: Course, join: Callable[..., float] = product) -> 
     def itself(value: float) -> float:
         return value
 
-    @anytime.module(quality=itself)
+    estimate = itself if shape in ("either", "chosen") else None
+
+    @anytime.module(quality=itself, estimate=estimate)
     def a(problem, *, rng):
         yield from steps(0, (), problem, rng)
 
@@ -114,7 +118,7 @@ def family(shape: str, course: Course, join: Callable[..., float] = product) -> 
     def b(x, problem, *, rng):
         yield from steps(1, (x,), problem, rng)
 
-    @anytime.module(quality=itself, name="b")
+    @anytime.module(quality=itself, estimate=estimate, name="b")
     def other(problem, *, rng):
         yield from steps(1, (), problem, rng)
 
@@ -130,6 +134,8 @@ def family(shape: str, course: Course, join: Callable[..., float] = product) -> 
         "pair": lambda problem: b(a(problem), problem),
         "chain": lambda problem: last(b(a(problem), problem), problem),
         "tree": lambda problem: both(a(problem), other(problem), problem),
+        "either": lambda problem: choose(a(problem), other(problem)),
+        "chosen": lambda problem: last(choose(a(problem), other(problem)), problem),
     }
 
     def shared(problem):
@@ -150,6 +156,8 @@ FAMILIES: Mapping[str, Callable[[], Program]] = {
     "tree": lambda: family("tree", smooth, worst),
     "gated tree": lambda: family("tree", ladder, gate),
     "shared": lambda: family("shared", smooth, worst),
+    "either": lambda: family("either", hard),
+    "chosen": lambda: family("chosen", smooth),
 }
 
 
@@ -171,17 +179,26 @@ def achieved(
 ) -> np.ndarray:
     """Quality in time on each problem, [problems]; 0 for no result."""
     values = np.zeros(len(problems))
-    output = compiled.program.output.label
     for row, problem in enumerate(problems):
-        deadline = Deadline.after(budget, WorkClock(machine))
+        deadline, made = Deadline.after(budget, WorkClock(machine)), dict[str, Known]()
 
-        def keep(label: str, value: float, change: object, row=row, deadline=deadline) -> None:
-            if label == output and deadline.remaining() >= -1e-9:
-                values[row] = value
+        def keep(label: str, value: float, change: object, made=made, deadline=deadline) -> None:
+            if deadline.remaining() >= -1e-9:
+                made[label] = Known(value, value)
 
         rng = np.random.default_rng(row)
         compiled.run(deadline=deadline, rng=rng, on_result=keep, problem=problem)
+        output = _known(compiled.program.output, made)
+        values[row] = output.value if output else 0.0
     return values
+
+
+def _known(node: object, made: Mapping[str, Known]) -> Known | None:
+    """What there is of a node, of the results of calls."""
+    if isinstance(node, Join):
+        return node.rule.value([_known(each, made) for each in node.arguments])
+    assert isinstance(node, Call)
+    return made.get(node.label)
 
 
 def budgets_of(compiled: CompiledProgram, count: int) -> np.ndarray:

@@ -81,7 +81,7 @@ def test_of_divisions_that_were_run_those_are_kept_that_are_the_best_with_no_mor
     assert calibration.promise(0.0) == 0.0
 
 
-@pytest.mark.parametrize("name", ["hard", "gated tree"])
+@pytest.mark.parametrize("name", ["hard", "gated tree", "either", "chosen"])
 def test_promises_are_kept_where_tables_are_mistaken(name):
     compiled = compiled_from(FAMILIES[name](), cases(60, 1))
     unseen = cases(150, 2)
@@ -107,11 +107,11 @@ def replayed(name, count=60):
     program = FAMILIES[name]()
     library = measure(program, cases(count, 4), seconds=0.06, clock=lambda: WorkClock(MACHINE))
     made = tables(program, library)
-    replay = replay_of(program, library, guards_of(library), [t.first for t in made])
+    replay = replay_of(program, library, guards_of(library), made)
     return made, divide(made), replay
 
 
-@pytest.mark.parametrize("name", ["ladder", "early"])
+@pytest.mark.parametrize("name", ["ladder", "early", "either", "chosen"])
 def test_a_life_on_recordings_is_that_of_the_executor(name):
     compiled = compiled_from(FAMILIES[name](), cases(30, 4))
     replay = compiled.replay
@@ -157,7 +157,7 @@ def test_problems_of_profiles_measured_apart_are_put_side_by_side():
     apart = measure(program, cases(9, 5), seconds=0.06, clock=lambda: WorkClock(MACHINE))
     mixed = {"a": library["a"], "b": apart["b"]}
     made = tables(program, mixed)
-    replay = replay_of(program, mixed, guards_of(mixed), [t.first for t in made])
+    replay = replay_of(program, mixed, guards_of(mixed), made)
     assert len(replay.problems) == 9
     shares = [float(table.times[-1]) for table in made]
     lived = replay.achieved(shares, sum(shares)).mean()
