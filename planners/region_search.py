@@ -181,7 +181,9 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
         pin_row, bend_row = int((pin + 0.5) * per_column), int((bend + 0.5) * per_column)
         pin_column, bend_column = pin - pin_row * columns, bend - bend_row * columns
         door, upright = np.int64(doors[here]) & 0xFF, doors[here] >> SIDE < 2
-        door_first = left if upright else top
+        door_first, door_line, door_ahead, door_along = top, pin_column, bend_column, bend_row
+        if upright:
+            door_first, door_line, door_ahead, door_along = left, pin_row, bend_row, bend_column
         bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
         inside, reached, mask = (pin_row - top) * SIDE + pin_column - left, np.int64(0), masks[here]
         edges = np.int64(edge[here])
@@ -193,22 +195,12 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
             ahead_is_row = side < 2
             if ahead_is_row:
                 corner, first, at, most, apart = top, left, block_row, tall, across
-                pin_ahead, pin_along, bend_ahead, bend_along = (
-                    pin_row,
-                    pin_column,
-                    bend_row,
-                    bend_column,
-                )
-                goal_ahead, goal_along = goal_row, goal_column
+                pin_ahead, pin_along, bend_ahead = pin_row, pin_column, bend_row
+                bend_along, goal_ahead, goal_along = bend_column, goal_row, goal_column
             else:
                 corner, first, at, most, apart = left, top, block_column, across, 1
-                pin_ahead, pin_along, bend_ahead, bend_along = (
-                    pin_column,
-                    pin_row,
-                    bend_column,
-                    bend_row,
-                )
-                goal_ahead, goal_along = goal_column, goal_row
+                pin_ahead, pin_along, bend_ahead = pin_column, pin_row, bend_column
+                bend_along, goal_ahead, goal_along = bend_row, goal_column, goal_row
             if side & 1:
                 if at + 1 == most:
                     continue
@@ -235,15 +227,9 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                     to_ahead, to_along = line, first + place
                     if upright != ahead_is_row:
                         to_ahead, to_along = to_along, to_ahead
-                    if upright:
-                        seen = _in_sight(
-                            door, door_first, pin_row, bend_row, bend_column, to_ahead, to_along
-                        )
-                    else:
-                        seen = _in_sight(
-                            door, door_first, pin_column, bend_column, bend_row, to_ahead, to_along
-                        )
-                    if not seen:
+                    if not _in_sight(
+                        door, door_first, door_line, door_ahead, door_along, to_ahead, to_along
+                    ):
                         place = crossing(pin_ahead, pin_along, goal_ahead, goal_along, line) - first
                         place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
                         from_ahead, from_along, from_g, from_cell = pin_ahead, pin_along, pin_g, pin

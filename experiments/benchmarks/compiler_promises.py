@@ -224,10 +224,9 @@ def measure_promises(
             reached = float(values.mean())
             gaps.append(abs(compiled.promise(budget) - reached))
             chance.append(1.96 * float(values.std()) * math.sqrt(1 / 300 + 1 / len(unseen)))
-            level = expected_quality(
-                compiled.tables,
-                moments_within(compiled.tables, [*compiled.allocate(budget).shares.values()]),
-            )
+            shares = compiled.allocate(budget).shares
+            row = [shares.get(table.label, 0.0) for table in compiled.tables]
+            level = expected_quality(compiled.tables, moments_within(compiled.tables, row))
             by_tables.append(abs(level - reached))
         errors[name] = max(gaps)
         for draw in range(2 if quick else 8):
