@@ -8,15 +8,15 @@ distributions for fixed times it gives the expected utility exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from compiler.ordering import Order, elimination_order
+from compiler.ordering import Bucket, Order, Scope, elimination_order
 
 Floats = NDArray[np.float64]
 Levels = NDArray[np.intp]
@@ -65,19 +65,36 @@ def eliminate(
     """
     order = order_of(factors, keep)
     tables = [factor.table for factor in factors]
-    least_sums = _least_sums if semiring is MIN_PLUS else None
-    for variable, members, scope, shape, blocks in order.buckets:
-        if least_sums is not None and blocks is not None:
-            one, other = members
-            left = least_sums(tables[one], tables[other].reshape(blocks))
-            tables.append(left if len(scope) == 1 else left.reshape(shape[1:]))
-        else:
-            names = (variable, *scope)
-            aligned = [_aligned(tables[n], order.scopes[n], names) for n in members]
-            tables.append(_summed_out(aligned, shape, semiring))
+    machine_code = _machine_code if semiring is MIN_PLUS else None
+    for buckets, start, numbers, parts in order.stages:
+        if machine_code is not None and parts:
+            along = tuple([tables[number] for number in numbers])
+            left = machine_code.least_sums_along(tables[start], along, len(parts))
+            tables += [left[part] for part in parts]
+            continue
+        for bucket in buckets:
+            tables.append(_left_behind(bucket, tables, order.scopes, semiring, machine_code))
     kept = tuple(keep)
     rest = [_aligned(tables[number], order.scopes[number], kept) for number in order.left]
     return Factor(kept, _joined(rest, semiring)), (Step(order, tuple(tables)),)
+
+
+def _left_behind(
+    bucket: Bucket,
+    tables: Sequence[Floats],
+    scopes: Sequence[Scope],
+    semiring: Semiring,
+    machine_code: MachineCode | None,
+) -> Floats:
+    """The table that a bucket leaves behind."""
+    variable, members, scope, shape, blocks = bucket
+    if machine_code is not None and blocks is not None:
+        one, other = members
+        left = machine_code.least_sums(tables[one], tables[other].reshape(blocks))
+        return left if len(scope) == 1 else left.reshape(shape[1:])
+    names = (variable, *scope)
+    aligned = [_aligned(tables[number], scopes[number], names) for number in members]
+    return _summed_out(aligned, shape, semiring)
 
 
 def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
@@ -97,12 +114,13 @@ def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> 
     levels = dict(chosen)
     count = max((len(each) for each in levels.values()), default=1)
     for step, bucket in [(s, b) for s in reversed(steps) for b in reversed(s.order.buckets)]:
-        if _least_places is not None and bucket.blocks is not None:
+        if _machine_code is not None and bucket.blocks is not None:
             one, other = (step.tables[number] for number in bucket.members)
             places = np.zeros(count, np.intp)
             for name, size in zip(bucket.scope, bucket.shape[1:], strict=True):
                 places = places * size + levels[name]
-            levels[bucket.variable] = _least_places(one, other.reshape(bucket.blocks), places)
+            blocks = other.reshape(bucket.blocks)
+            levels[bucket.variable] = _machine_code.least_places(one, blocks, places)
             continue
         costs: Floats | None = None
         for number in bucket.members:
@@ -121,15 +139,23 @@ def warm_up() -> None:
     It pays for who compiles often, not for one compilation: numba takes longer to load than a
     program to be compiled.
     """
-    global _least_sums, _least_places
+    global _machine_code
     from compiler import kernels
 
-    _least_sums = cast(Callable[[Floats, Floats], Floats], kernels.least_sums)
-    _least_places = cast(Callable[[Floats, Floats, Levels], Levels], kernels.least_places)
+    _machine_code = cast(MachineCode, kernels)
 
 
-_least_sums: Callable[[Floats, Floats], Floats] | None = None
-_least_places: Callable[[Floats, Floats, Levels], Levels] | None = None
+class MachineCode(Protocol):
+    """What `compiler.kernels` has."""
+
+    def least_sums(self, costs: Floats, table: Floats) -> Floats: ...
+
+    def least_sums_along(self, costs: Floats, tables: Sequence[Floats], count: int) -> Floats: ...
+
+    def least_places(self, costs: Floats, table: Floats, places: Levels) -> Levels: ...
+
+
+_machine_code: MachineCode | None = None
 
 
 def _aligned(table: Floats, scope: tuple[str, ...], names: tuple[str, ...]) -> Floats:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -13,6 +14,7 @@ import numpy as np
 
 EASY = 1e6  # cells of the largest table up to which a better order is not looked for
 TRIES = 40  # random orders, beyond that
+ALONG = 8  # tables that are gone through at once, at most
 
 Scope = tuple[str, ...]
 
@@ -34,9 +36,23 @@ class Bucket(NamedTuple):
     blocks: tuple[int, int, int] | None
 
 
+class Stage(NamedTuple):
+    """Buckets that are eliminated at once: one, or several along a chain.
+
+    Along a chain the first bucket joins the factor `start` with a table of two axes, every further
+    one what the last left behind with another. tables: numbers of those, `ALONG` of them, the last
+    repeated; parts: where each bucket's factor lies in the row of all. Both are empty for one.
+    """
+
+    buckets: tuple[Bucket, ...]
+    start: int
+    tables: tuple[int, ...]
+    parts: tuple[slice, ...]
+
+
 @dataclass(frozen=True)
 class Order:
-    """Buckets in the order of elimination.
+    """Buckets in the order of elimination, and the same in stages.
 
     scopes: of all factors, those that buckets leave behind included. left: numbers of the factors
     that are left at the end. cells: of the largest joined table; all_cells: of all of them, to
@@ -44,6 +60,7 @@ class Order:
     """
 
     buckets: tuple[Bucket, ...]
+    stages: tuple[Stage, ...]
     scopes: tuple[Scope, ...]
     left: tuple[int, ...]
     cells: float
@@ -158,7 +175,33 @@ def _greedy(
                 heapq.heappush(waiting, (costs[name], name))
     left = tuple([number for number in range(len(scopes)) if number not in used])
     cells = [prod(bucket.shape) for bucket in buckets]
-    return Order(tuple(buckets), tuple(scopes), left, max(cells, default=1), sum(cells))
+    stages = _stages(buckets, len(scopes) - len(buckets))
+    return Order(tuple(buckets), stages, tuple(scopes), left, max(cells, default=1), sum(cells))
+
+
+def _stages(buckets: Sequence[Bucket], factors: int) -> tuple[Stage, ...]:
+    rows: list[list[Bucket]] = []
+    for number, bucket in enumerate(buckets):
+        goes_on = rows and len(rows[-1]) < ALONG and _along(rows[-1][-1]) and _along(bucket)
+        if goes_on and bucket.members[0] == factors + number - 1:
+            rows[-1].append(bucket)
+        else:
+            rows.append([bucket])
+    return tuple([_stage(row) for row in rows])
+
+
+def _along(bucket: Bucket) -> bool:
+    return bucket.blocks is not None and bucket.blocks[0] == 1 and len(bucket.scope) == 1
+
+
+def _stage(row: Sequence[Bucket]) -> Stage:
+    if len(row) == 1:
+        return Stage(tuple(row), row[0].members[0], (), ())
+    tables = [bucket.members[1] for bucket in row]
+    ends = [0, *itertools.accumulate(bucket.shape[1] for bucket in row)]
+    parts = tuple([slice(*pair) for pair in itertools.pairwise(ends)])
+    padded = (*tables, *tables[-1:] * (ALONG - len(tables)))
+    return Stage(tuple(row), row[0].members[0], padded, parts)
 
 
 def _bucket(

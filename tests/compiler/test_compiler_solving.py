@@ -138,14 +138,35 @@ def test_machine_code_gives_the_same_bits_and_walks_the_same_ways(program):
 
     for semiring in (MIN_PLUS, SUM_PRODUCT):
         with pytest.MonkeyPatch.context() as patched:
-            patched.setattr(elimination, "_least_sums", None)
-            patched.setattr(elimination, "_least_places", None)
+            patched.setattr(elimination, "_machine_code", None)
             plain, ways = found(semiring)
             elimination.warm_up()
             warm, warm_ways = found(semiring)
         assert np.array_equal(warm, plain, equal_nan=True)
         if semiring is MIN_PLUS:
             assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
+
+
+@pytest.mark.parametrize("layout", ["C", "F"])
+def test_machine_code_goes_along_a_chain_of_unequal_tables_with_the_same_bits(layout):
+    rng = np.random.default_rng(0)
+    sizes = [*rng.integers(1, 12, size=21)]
+    tables = [rng.random(sizes[0]), *[rng.random(pair) for pair in itertools.pairwise(sizes)]]
+    scopes = [("0",), *[(str(place), str(place + 1)) for place in range(20)]]
+    factors = [
+        Factor(scope, np.asarray(np.where(table < 0.2, np.inf, table), order=layout))
+        for scope, table in zip(scopes, tables, strict=True)
+    ]
+    wanted = {"20": np.arange(sizes[-1])}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(elimination, "_machine_code", None)
+        plain, (steps,) = eliminate(factors, ("20",), MIN_PLUS)
+        ways = all_cheapest_levels((steps,), wanted)
+        elimination.warm_up()
+        warm, (warm_steps,) = eliminate(factors, ("20",), MIN_PLUS)
+        warm_ways = all_cheapest_levels((warm_steps,), wanted)
+    assert np.array_equal(warm.table, plain.table)
+    assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
 
 
 def test_large_tables_are_joined_in_pieces_with_the_same_result():
