@@ -14,7 +14,7 @@ import numpy as np
 
 EASY = 1e6  # cells of the largest table up to which a better order is not looked for
 TRIES = 40  # random orders, beyond that
-ALONG = 8  # tables that are gone through at once, at most
+ALONG = 12  # tables that machine code goes through at one call, at most
 
 Scope = tuple[str, ...]
 
