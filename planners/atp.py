@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
-from planners import blocks, improving, region_search, tracing
+from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
@@ -163,7 +163,7 @@ class _Query:
             int(self.cost) if known else SPAN, exact, run,
         )  # fmt: skip
         if known:
-            improving.follow_way(*self._map, run)
+            way_in_hand.follow_way(*self._map, run)
         else:
             state[COUNT] = 0
         grain = GRAIN if known else _FIRST_GRAIN
@@ -186,7 +186,7 @@ class _Query:
         if done == OUT_OF_BUDGET:
             return
         if state[MEETING] >= 0:
-            self.cost = int(improving.take_up(*self._map, self.start, self.diagonals, run))
+            self.cost = int(way_in_hand.take_up(*self._map, self.start, self.diagonals, run))
         if exact:
             self.least = self.cost
         yield float(taken)
@@ -240,7 +240,7 @@ class _Query:
         state[improving.POSITION] = 0
         self._expect(None)
         while not done:
-            done, taken = improving.improve_windows(
+            done, taken = way_in_hand.improve_windows(
                 *self._map, length, self.diagonals, self.run, GRAIN
             )
             state[MEETING] = -1
@@ -249,15 +249,15 @@ class _Query:
 
     def _weigh(self) -> None:
         count = int(self.run.state[COUNT])
-        self.cost = int(improving.way_cost(*self._map, self.run.path, 0, count - 1))
+        self.cost = int(way_in_hand.way_cost(*self._map, self.run.path, 0, count - 1))
 
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
         way = self.run.path[: self.run.state[COUNT]]
         if self.run.state[MEETING] >= 0:
-            way = improving.so_far(*self._map, self.start, self.diagonals, self.run)
+            way = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
             # Labels that were corrected since may have made it even shorter than was told.
-            self.cost = int(improving.way_cost(*self._map, way, 0, len(way) - 1))
+            self.cost = int(way_in_hand.way_cost(*self._map, way, 0, len(way) - 1))
         return way_plan(way, self.grid.shape[1], self.cost, self.least)
 
 

@@ -52,9 +52,18 @@ class Grid:
 
     @classmethod
     def known(cls, free: NDArray[np.bool_]) -> Grid:
-        """A map without doubt: `free` is bool [rows, columns]. It is not copied."""
+        """A map without doubt: `free` is bool [rows, columns], or bytes 0 and 1. It is not copied.
+
+        Raises AnytimeError for other bytes: a search reads them as bits.
+        """
+        cells = flat(free, "free")
+        if free.dtype != np.bool_ and int(cells.max()) > 1:
+            raise AnytimeError(
+                f"free holds {int(cells.max())}: give bools, True where a cell is free, as in "
+                "`picture > 0`"
+            )
         grid = cls.__new__(cls)
-        grid._set(flat(free, "free"), 0, free.shape)
+        grid._set(cells, 0, free.shape)
         return grid
 
     def _set(self, cost: NDArray[np.uint8], wall: int, shape: tuple[int, ...]) -> None:

@@ -1,4 +1,4 @@
-"""A way that is made shorter: best-first search on the whole map, and in windows along it.
+"""Best-first search for a way that beats the one in hand.
 
 A search gives its time back after any number of expansions and goes on later. It knows the way in
 hand: nothing is expanded that cannot beat it, and where the search comes to a cell of that way more
@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import next_base, path_to, step_between, step_cost, with_room
+from planners.frontier import next_base
 from planners.search import (
     ACROSS,
     DIAGONAL,
@@ -42,7 +42,6 @@ window begins."""
 NOTHING = -1
 _NARROW = 12  # 4 096 is less than the smallest positive step of f on a free floor
 _ENTRIES = 8
-_WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
 
 class Run(NamedTuple):
@@ -284,101 +283,3 @@ def reweigh(columns, goal, run):
         opened += 1
         state[LOW], state[HIGH] = min(state[LOW], number), max(state[HIGH], number)
     state[CURRENT], state[OPENED], state[FRESH] = state[LOW], opened, opened
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def way_cost(cost, wall, columns, path, first, last):
-    """Cost of the way from its cell number `first` to its cell number `last`."""
-    total = np.int64(0)
-    for place in range(first, last):
-        node, there = np.int64(path[place]), np.int64(path[place + 1])
-        down, across = step_between(node, there, columns)
-        total += step_cost(cost, wall, columns, node, down, across)
-    return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def so_far(cost, wall, columns, start, diagonals, run):
-    """The way as a search that has beaten it, and still goes on, has made it shorter so far: flat
-    indices."""
-    count, node = run.state[COUNT], run.state[MEETING]
-    beginning = path_to(cost, wall, columns, start, node, diagonals, run)
-    if count == 0 or node == run.path[count - 1]:
-        return beginning
-    rest = 0
-    while run.path[rest] != node:
-        rest += 1
-    way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
-    for place in range(rest + 1, count):
-        way[beginning.size + place - rest - 1] = run.path[place]
-    return way
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def take_up(cost, wall, columns, start, diagonals, run):
-    """Take up what the last search found: its way to `MEETING`, and then the way in hand.
-
-    Returns the cost of the new way.
-    """
-    node, count, rest = run.state[MEETING], run.state[COUNT], 0
-    beginning = path_to(cost, wall, columns, start, node, diagonals, run)
-    run.state[MEETING] = NOTHING
-    while rest < count and run.path[rest] != node:
-        rest += 1
-    _replace(run, 0, min(rest, count - 1), beginning)
-    return way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _replace(run, first, last, piece):
-    """Put a piece in the place of the way's cells `first` to `last`."""
-    count = run.state[COUNT]
-    grown = piece.size - (last - first + 1)
-    if grown > 0:
-        for place in range(count - 1, last, -1):
-            run.path[place + grown] = run.path[place]
-    elif grown < 0:
-        for place in range(last + 1, count):
-            run.path[place + grown] = run.path[place]
-    for place in range(piece.size):
-        run.path[first + place] = piece[place]
-    run.state[COUNT] = count + grown
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def follow_way(cost, wall, columns, run):
-    """Tell the search that has begun what the way in hand costs up to each of its cells."""
-    total, base = np.int64(0), run.state[BASE]
-    run.state[FOLLOWS] = 1
-    run.prefix[run.path[0]] = base
-    for place in range(run.state[COUNT] - 1):
-        total += way_cost(cost, wall, columns, run.path, place, place + 1)
-        run.prefix[run.path[place + 1]] = base + total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def improve_windows(cost, wall, columns, length, diagonals, run, budget):
-    """Make the way in hand the shortest in windows of `length` cells, half of each in the next.
-
-    Returns (done, expansions). `run.norm` must be exact. A window that is as short
-    as can be costs nothing.
-    """
-    state, path, expansions = run.state, run.path, 0
-    while state[POSITION] < state[COUNT] - 1:
-        if expansions >= budget:
-            return False, expansions
-        first = state[POSITION]
-        last = min(first + length, state[COUNT] - 1)
-        start, goal = np.int64(path[first]), np.int64(path[last])
-        before = way_cost(cost, wall, columns, path, first, last)
-        down, across = goal // columns - start // columns, goal % columns - start % columns
-        if before > estimated(down, across, run.norm):
-            begin(cost, columns, start, goal, before, True, run)
-            _, taken = search(cost, wall, columns, goal, diagonals, run, _WINDOW_BUDGET)
-            expansions += taken
-            if state[MEETING] >= 0:
-                piece = path_to(cost, wall, columns, start, goal, diagonals, run)
-                _replace(run, first, last, piece)
-                last = first + piece.size - 1
-        state[POSITION] = last if last == state[COUNT] - 1 else first + max(1, (last - first) // 2)
-    return True, expansions

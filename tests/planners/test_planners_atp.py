@@ -200,6 +200,14 @@ def test_as_an_anytime_module_it_counts_its_own_work():
     assert result.value.plan.tobytes() == plans_of(steps(domain, start, goal))[-1].plan.tobytes()
 
 
+def test_a_known_map_may_be_given_as_bytes_of_0_and_1():
+    free, start, goal = instance("rooms", 64, 0)
+    as_bytes, as_bools = (
+        plans_of(steps(Grid.known(kind), start, goal)) for kind in (free.astype(np.uint8), free)
+    )
+    assert [p.plan.tobytes() for p in as_bytes] == [p.plan.tobytes() for p in as_bools]
+
+
 def test_mistakes_are_named():
     domain = np.zeros((9, 9), np.float32)
     with pytest.raises(AnytimeError, match=r"goal cell \(9, 0\) is outside"):
@@ -217,6 +225,8 @@ def test_mistakes_are_named():
         grid.update(8, 8, np.zeros((2, 2), np.float32))
     with pytest.raises(AnytimeError, match="the map is known"):
         grid.update(0, 0, np.full((2, 2), 0.5, np.float32))
+    with pytest.raises(AnytimeError, match="free holds 255: give bools"):
+        Grid.known(np.full((9, 9), 255, np.uint8))
 
 
 def fingerprint(size):

@@ -14,10 +14,10 @@ from planners.improving import (
     new_run,
     reweigh,
     search,
-    take_up,
 )  # fmt: skip
 from planners.norms import expected_norm, least_norm
 from planners.search import SPAN
+from planners.way_in_hand import take_up
 from sensing import uniform
 
 
