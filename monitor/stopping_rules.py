@@ -208,13 +208,19 @@ def waited(seconds: Floats, seen: Floats) -> Floats:
     return seconds - seconds[last]
 
 
-def _ridge(features: Floats, wanted: Floats, penalty: float) -> tuple[Floats, Floats]:
-    """Intercepts [D] and slopes [F, D] of a ridge regression on standardised features."""
-    mean, spread = features.mean(axis=0), features.std(axis=0) + TINY
-    scaled = (features - mean) / spread
-    middle = wanted.mean(axis=0)
-    square = scaled.T @ scaled + penalty * len(scaled) * np.eye(scaled.shape[1])
-    slopes = np.linalg.solve(square, scaled.T @ (wanted - middle)) / spread[:, None]
+def _ridge(squares: Floats, products: Floats, penalty: float) -> tuple[Floats, Floats]:
+    """Intercepts [D] and slopes [F, D] of a ridge regression on standardised features.
+
+    squares: [1 + F, 1 + F], sums over its rows of products of a one and the features; products:
+    [1 + F, D], of these with what is wanted.
+    """
+    rows, mean = squares[0, 0], squares[0, 1:] / squares[0, 0]
+    middle = products[0] / rows
+    spread = squares[1:, 1:] / rows - np.outer(mean, mean)
+    joint = products[1:] / rows - np.outer(mean, middle)
+    scale = np.sqrt(np.maximum(spread.diagonal(), 0.0)) + TINY
+    spread = spread / np.outer(scale, scale) + penalty * np.eye(len(mean))
+    slopes = np.linalg.solve(spread, joint / scale[:, None]) / scale[:, None]
     return middle - mean @ slopes, slopes
 
 
@@ -230,7 +236,8 @@ def regression(runs: Runs, task: Task) -> StoppingRule:
     models: list[tuple[Floats, Floats]] = []
     for index in range(count - 2, -1, -1):
         gain = utilities[:, index + 1] - utilities[:, index] - task.look + beyond
-        base, slopes = _ridge(seen[:, index], gain[:, None], RIDGE_OF_VALUES)
+        rows = np.column_stack([np.ones(len(runs)), seen[:, index]])
+        base, slopes = _ridge(rows.T @ rows, rows.T @ gain[:, None], RIDGE_OF_VALUES)
         models.append((base, slopes))
         beyond = np.where((base + seen[:, index] @ slopes)[:, 0] > 0, gain, 0.0)
     models.reverse()
@@ -261,20 +268,7 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
     unit = float(np.median(np.diff(runs.seconds))) if count > 1 else 1.0
     plateau = np.log1p(waited(runs.seconds, runs.seen) / unit)
     seen = np.concatenate([features.of_runs(runs), plateau[:, :, None]], axis=2)
-    width = max(1, round(WINDOW * count))
-    models: list[tuple[Floats, Floats]] = []
-    for index in range(count - 1):
-        near = np.arange(max(0, index - width), min(count - 1, index + width + 1))
-        later = np.minimum(near[:, None] + np.arange(1, count - index), count - 1)
-        gains = runs.quality[:, later] - runs.quality[:, near, None]
-        offset = np.broadcast_to(
-            (near - index).astype(np.float64)[None, :, None], (len(runs), len(near), 1)
-        )
-        rows = np.concatenate([seen[:, near], offset], axis=2)
-        base, slopes = _ridge(
-            rows.reshape(-1, rows.shape[2]), gains.reshape(-1, gains.shape[2]), RIDGE
-        )
-        models.append((base, slopes[:-1]))
+    models = _gains(seen, runs.quality, max(1, round(WINDOW * count)))
     intercept, slope = true_of_seen(runs)
 
     def rule(history: History) -> float | Stop:
@@ -294,6 +288,38 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
         return until(float(history.seconds[-1]), float(runs.seconds[index + 1]))
 
     return rule
+
+
+def _gains(seen: Floats, quality: Floats, width: int) -> list[tuple[Floats, Floats]]:
+    """What quality gains from each time but the last to every later one, by what is seen then: a
+    ridge regression each, intercepts [D] and slopes [F, D].
+
+    seen: [N, T, F]. It learns from all runs at the times up to `width` around its own, the time
+    being one more thing that is seen. Neighbouring regressions share most of their rows, so what
+    they need of them, sums of products, is added up once for each time.
+    """
+    runs, count, _ = seen.shape
+    times = np.arange(count)
+    centre = seen.mean(axis=(0, 1))  # of numbers far from 0 sums of squares are inexact
+    clock = np.broadcast_to(times[:, None], (runs, count, 1))
+    rows = np.concatenate([np.ones((runs, count, 1)), seen - centre, clock - count / 2], axis=2)
+    squares = np.zeros((count, rows.shape[2], rows.shape[2]))
+    products = np.zeros((count, rows.shape[2], count - 1))
+    for time in times[:-1]:
+        now, later = rows[:, time], np.minimum(time + times[1:], count - 1)
+        squares[time + 1] = squares[time] + now.T @ now
+        gains = quality[:, later] - quality[:, time, None]
+        products[time + 1] = products[time] + now.T @ gains
+    models: list[tuple[Floats, Floats]] = []
+    for time in times[:-1]:
+        first, last = max(0, time - width), min(count - 1, time + width + 1)
+        later = count - 1 - time
+        base, slopes = _ridge(
+            squares[last] - squares[first], (products[last] - products[first])[:, :later], RIDGE
+        )
+        base = base - centre @ slopes[:-1] + (time - count / 2) * slopes[-1]
+        models.append((base, slopes[:-1]))
+    return models
 
 
 # The preferred first: what learns most from few runs. The fixed contract stands beside them always.
