@@ -175,23 +175,34 @@ def _greedy(
                 heapq.heappush(waiting, (costs[name], name))
     left = tuple([number for number in range(len(scopes)) if number not in used])
     cells = [prod(bucket.shape) for bucket in buckets]
-    stages = _stages(buckets, len(scopes) - len(buckets))
+    stages = _stages(buckets, scopes)
     return Order(tuple(buckets), stages, tuple(scopes), left, max(cells, default=1), sum(cells))
 
 
-def _stages(buckets: Sequence[Bucket], factors: int) -> tuple[Stage, ...]:
+def _stages(buckets: Sequence[Bucket], scopes: Sequence[Scope]) -> tuple[Stage, ...]:
     rows: list[list[Bucket]] = []
-    for number, bucket in enumerate(buckets):
-        goes_on = rows and len(rows[-1]) < ALONG and _along(rows[-1][-1]) and _along(bucket)
-        if goes_on and bucket.members[0] == factors + number - 1:
+    left = len(scopes) - len(buckets)  # number of the factor that a bucket leaves behind
+    for number, bucket in enumerate(buckets, left):
+        goes_on = rows and len(rows[-1]) < ALONG and bucket.members[0] == number - 1
+        if goes_on and _along(rows[-1][-1], scopes) and _along(bucket, scopes):
             rows[-1].append(bucket)
         else:
             rows.append([bucket])
     return tuple([_stage(row) for row in rows])
 
 
-def _along(bucket: Bucket) -> bool:
-    return bucket.blocks is not None and bucket.blocks[0] == 1 and len(bucket.scope) == 1
+def _along(bucket: Bucket, scopes: Sequence[Scope]) -> bool:
+    """Whether it joins a factor of its variable alone with one of that and another, in that
+    order."""
+    return (
+        bucket.blocks is not None
+        and scopes[bucket.members[1]]
+        == (
+            bucket.variable,
+            *bucket.scope,
+        )
+        and len(bucket.scope) == 1
+    )
 
 
 def _stage(row: Sequence[Bucket]) -> Stage:

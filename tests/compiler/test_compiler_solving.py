@@ -147,24 +147,31 @@ def test_machine_code_gives_the_same_bits_and_walks_the_same_ways(program):
             assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
 
 
-@pytest.mark.parametrize("layout", ["C", "F"])
-def test_machine_code_goes_along_a_chain_of_unequal_tables_with_the_same_bits(layout):
-    rng = np.random.default_rng(0)
-    sizes = [*rng.integers(1, 12, size=21)]
-    tables = [rng.random(sizes[0]), *[rng.random(pair) for pair in itertools.pairwise(sizes)]]
-    scopes = [("0",), *[(str(place), str(place + 1)) for place in range(20)]]
-    factors = [
-        Factor(scope, np.asarray(np.where(table < 0.2, np.inf, table), order=layout))
-        for scope, table in zip(scopes, tables, strict=True)
-    ]
-    wanted = {"20": np.arange(sizes[-1])}
+@given(
+    st.lists(st.integers(1, 5), min_size=2, max_size=30),
+    st.lists(st.booleans(), min_size=30, max_size=30),
+    st.sampled_from("CF"),
+    st.integers(0, 2**32),
+)
+@settings(deadline=None)
+def test_machine_code_goes_along_a_chain_of_unequal_tables_with_the_same_bits(
+    sizes, turned, layout, seed
+):
+    rng = np.random.default_rng(seed)
+    factors = [Factor(("0",), rng.random(sizes[0]))]
+    for place, (before, after) in enumerate(itertools.pairwise(sizes)):
+        scope, table = (str(place), str(place + 1)), rng.random((before, after))
+        table = np.asarray(np.where(table < 0.2, np.inf, table), order=layout)
+        factors.append(Factor(scope[::-1], table.T) if turned[place] else Factor(scope, table))
+    output = str(len(sizes) - 1)
+    wanted = {output: np.arange(sizes[-1])}
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(elimination, "_machine_code", None)
-        plain, (steps,) = eliminate(factors, ("20",), MIN_PLUS)
-        ways = all_cheapest_levels((steps,), wanted)
+        plain, steps = eliminate(factors, (output,), MIN_PLUS)
+        ways = all_cheapest_levels(steps, wanted)
         elimination.warm_up()
-        warm, (warm_steps,) = eliminate(factors, ("20",), MIN_PLUS)
-        warm_ways = all_cheapest_levels((warm_steps,), wanted)
+        warm, warm_steps = eliminate(factors, (output,), MIN_PLUS)
+        warm_ways = all_cheapest_levels(warm_steps, wanted)
     assert np.array_equal(warm.table, plain.table)
     assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
 
