@@ -87,7 +87,10 @@ class Execution:
         given = {f"input {name}": Known(value) for name, value in self.inputs.items()}
         return given | {label: known for label, known in nodes.items() if known is not None}
 
-    def _one(self, call: Call, clock: Clock) -> list[tuple[str, Result]]:
+    def _one(
+        self, call: Call, clock: Clock, behind: Sequence[Call] = ()
+    ) -> list[tuple[str, Result]]:
+        """Run a call. behind: calls of other arms that wait for its processor."""
         found = [self.known(argument) for argument in call.arguments]
         if any(argument is None for argument in found):
             self._skipped.add(call.label)  # what it needs never came, or is of an arm not taken
@@ -97,7 +100,7 @@ class Execution:
             left = self.deadline.at - clock.now()
             share = self.decide(call.label, left, self._everything())
             self.granted[call.label] = share.seconds
-        hard, ends, held = self._limits(call, clock, share)
+        hard, ends, held = self._limits(call, clock, behind, share)
         own = replace(self.deadline, clock=clock, at=hard if held else ends)
         observe = None if self.on_result is None else partial(self.on_result, call.label)
         if share is not None and share.watched:
@@ -117,13 +120,21 @@ class Execution:
         return [(call.label, self.parts[call.label])]
 
     def _limits(
-        self, call: Call, clock: Clock, share: Share | None
+        self, call: Call, clock: Clock, behind: Sequence[Call], share: Share | None
     ) -> tuple[float, float, Callable[[Run], bool] | None]:
         """The latest that a call may end, the end of its share, and its guard, if it has one."""
         now, latest = clock.now(), self.deadline.at
-        rest = [other for other in self.program.calls if other is not call and self._wanted(other)]
-        first = {other.label: self.tables[other.label].first for other in rest}
-        hard = latest - _least(self.tables, first)
+        waiting = {other.label: self.tables[other.label].first for other in behind}
+        # Other arms of its groups are run beside it, or not at all; what follows both waits.
+        first = {
+            other.label: self.tables[other.label].first
+            for other in self.program.calls
+            if other is not call
+            and self._wanted(other)
+            and not _beside(self.tables[other.label], self.tables[call.label])
+        }
+        rest = first.keys() | waiting
+        hard = latest - _least(self.tables, first) - sum(waiting.values())
         hard = min(hard, self.started + self._due.get(call.label, np.inf))
         ends = now + share.seconds if share else self.started + self.planned[call.label]
         if not rest:
@@ -170,10 +181,18 @@ class Execution:
 
     def _queue(self, calls: Sequence[Call], clock: Clock) -> list[tuple[str, Result]]:
         made: list[tuple[str, Result]] = []
-        for call in calls:
+        for place, call in enumerate(calls):
             if self._wanted(call):
-                made += self._one(call, clock)
+                made += self._one(call, clock, self._of_other_arms(call, calls[place + 1 :]))
         return made
+
+    def _of_other_arms(self, call: Call, calls: Sequence[Call]) -> list[Call]:
+        own = self.tables[call.label]
+        return [
+            other
+            for other in calls
+            if self._wanted(other) and _beside(self.tables[other.label], own)
+        ]
 
     def _share(self, call: Call) -> float:
         return self.planned.get(call.label, 0.0)

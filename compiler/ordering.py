@@ -194,15 +194,8 @@ def _stages(buckets: Sequence[Bucket], scopes: Sequence[Scope]) -> tuple[Stage, 
 def _along(bucket: Bucket, scopes: Sequence[Scope]) -> bool:
     """Whether it joins a factor of its variable alone with one of that and another, in that
     order."""
-    return (
-        bucket.blocks is not None
-        and scopes[bucket.members[1]]
-        == (
-            bucket.variable,
-            *bucket.scope,
-        )
-        and len(bucket.scope) == 1
-    )
+    around = (bucket.variable, *bucket.scope)
+    return bucket.blocks is not None and len(around) == 2 and scopes[bucket.members[1]] == around
 
 
 def _stage(row: Sequence[Bucket]) -> Stage:

@@ -200,7 +200,7 @@ class Replay:
         median = np.array([steps.median[place] for place in index])
         p95 = np.array([steps.p95[place] for place in index])
         at = now[:, None] + seconds[:, :-1]
-        refused = (at + median > share_end + EPSILON) | (at + p95 > hard)
+        refused = (at + median > share_end + EPSILON) | (at + p95 > hard + EPSILON)
         stops = np.hstack([refused, np.ones((len(refused), 1), dtype=bool)])
         count = 1 + np.asarray(stops.argmax(axis=1), dtype=np.intp)
         return np.where(now < hard, count, 0)

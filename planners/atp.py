@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import anytime
 from planners import blocks, improving, region_search, tracing, way_in_hand
-from planners.frontier import least_way
+from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
@@ -249,7 +249,7 @@ class _Query:
 
     def _weigh(self) -> None:
         count = int(self.run.state[COUNT])
-        self.cost = int(way_in_hand.way_cost(*self._map, self.run.path, 0, count - 1))
+        self.cost = int(way_cost(*self._map, self.run.path, 0, count - 1))
 
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
@@ -257,7 +257,7 @@ class _Query:
         if self.run.state[MEETING] >= 0:
             way = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
             # Labels that were corrected since may have made it even shorter than was told.
-            self.cost = int(way_in_hand.way_cost(*self._map, way, 0, len(way) - 1))
+            self.cost = int(way_cost(*self._map, way, 0, len(way) - 1))
         return way_plan(way, self.grid.shape[1], self.cost, self.least)
 
 

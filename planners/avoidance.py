@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from planners.frontier import cells_of
-from planners.path_finding import Cell, flat, index_of
+from planners.path_finding import Cell, flat, flat_free, index_of
 from planners.search import STRAIGHT, UNLIMITED, workspace
 from planners.walking import REACHED, UNREACHABLE
 from planners.walking import walk as _walk
@@ -61,7 +61,7 @@ def walk(
             )
     if leash < 0 or math.isnan(leash):
         raise AnytimeError(f"leash is {leash:g} cells, it must be at least 0")
-    world, first = flat(free, "free"), index_of(start, shape, "start")
+    world, first = flat_free(free, "free"), index_of(start, shape, "start")
     last = index_of(goal, shape, "goal")
     if not world[first]:
         raise AnytimeError(f"start cell ({start[0]}, {start[1]}) is blocked, no robot can be there")

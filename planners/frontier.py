@@ -124,6 +124,17 @@ def step_between(node, there, columns):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def way_cost(cost, wall, columns, path, first, last):
+    """Return the cost of the way from its cell number `first` to its cell number `last`."""
+    total = np.int64(0)
+    for place in range(first, last):
+        node, there = np.int64(path[place]), np.int64(path[place + 1])
+        down, across = step_between(node, there, columns)
+        total += step_cost(cost, wall, columns, node, down, across)
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def cells_of(path, columns, ahead):
     """Return a path as int32 [n, ahead + 2] cells, with so many zeros ahead of their rows and
     columns, and how many of its steps are diagonal."""

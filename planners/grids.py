@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from planners.blocks import SIDE, Regions, forget, new_regions
 from planners.map_features import features
-from planners.path_finding import Cell, flat, index_of
+from planners.path_finding import Cell, flat_free, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "58d22540ba7d"
+CALLED = "36bb0186bf2b"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much
@@ -42,6 +42,11 @@ class Grid:
     """
 
     def __init__(self, domain: NDArray[np.floating]) -> None:
+        if getattr(domain, "dtype", None) == np.bool_:
+            raise AnytimeError(
+                "the domain is bool, it must be probabilities of being blocked; "
+                "`Grid.known(free)` takes a map of free cells"
+            )
         domain = np.ascontiguousarray(domain, np.float32)
         if domain.ndim != 2 or not domain.size:
             raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [rows, columns]")
@@ -52,18 +57,13 @@ class Grid:
 
     @classmethod
     def known(cls, free: NDArray[np.bool_]) -> Grid:
-        """A map without doubt: `free` is bool [rows, columns], or bytes 0 and 1. It is not copied.
+        """A map without doubt: `free` is bool [rows, columns], or bytes 0 and 1. It is not copied
+        if it lies in one piece and may be written.
 
-        Raises AnytimeError for other bytes: a search reads them as bits.
+        Raises AnytimeError for other bytes: searches read them as bits.
         """
-        cells = flat(free, "free")
-        if free.dtype != np.bool_ and int(cells.max()) > 1:
-            raise AnytimeError(
-                f"free holds {int(cells.max())}: give bools, True where a cell is free, as in "
-                "`picture > 0`"
-            )
         grid = cls.__new__(cls)
-        grid._set(cells, 0, free.shape)
+        grid._set(flat_free(free, "free"), 0, free.shape)
         return grid
 
     def _set(self, cost: NDArray[np.uint8], wall: int, shape: tuple[int, ...]) -> None:

@@ -28,7 +28,7 @@ from planners.search import (
     WALL,
 )
 
-CALLED = "aa0832599406"
+CALLED = "f700364c3c3c"
 
 DONE = 0
 BUCKETS = 1 << 13

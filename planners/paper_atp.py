@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "fd5e1573cbf4"
+CALLED = "ff0f4f4e50df"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

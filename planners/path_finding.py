@@ -1,6 +1,7 @@
 """Shortest and nearly shortest paths between two cells of a grid [ZR93 §3.2, PATH-FINDER]."""
 
 import math
+import operator
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from planners.frontier import cells_of, path_to
+from planners.frontier import cells_of, path_to, way_cost
 from planners.search import NO_PATH, UNLIMITED, WALL, Workspace, bucket_search, workspace
 from planners.windows import window_search
 
@@ -80,16 +81,37 @@ def route(
 
 def flat(grid: NDArray[Any], name: str) -> NDArray[np.uint8]:
     """View a bool or uint8 map [rows, columns] as flat bytes, without a copy where it can."""
+    if not isinstance(grid, np.ndarray):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"{name} is a {type(grid).__name__}; give an array [rows, columns]")
     if grid.ndim != 2 or not grid.size or grid.dtype not in (np.bool_, np.uint8):
         raise AnytimeError(
             f"{name} is {grid.dtype} {list(grid.shape)}, it must be bool or uint8 [rows, columns]"
         )
-    return np.ascontiguousarray(grid).view(np.uint8).reshape(-1)
+    cells = np.ascontiguousarray(grid)
+    # For arrays that may not be written numba would compile every kernel once more.
+    cells = cells if cells.flags.writeable else cells.copy()
+    return cells.view(np.uint8).reshape(-1)
+
+
+def flat_free(free: NDArray[Any], name: str) -> NDArray[np.uint8]:
+    """`flat` of a map of free cells, whose bytes searches read as bits: 0 and 1 alone."""
+    cells = flat(free, name)
+    if free.dtype != np.bool_ and int(cells.max()) > 1:
+        raise AnytimeError(
+            f"{name} holds {int(cells.max())}: give bools, True where a cell is free, as in "
+            "`picture > 0`"
+        )
+    return cells
 
 
 def index_of(cell: Cell, shape: tuple[int, ...], name: str) -> int:
     """Return the flat index of a (row, column) cell of a map, or raise where it lies outside."""
-    row, column = int(cell[0]), int(cell[1])
+    try:
+        row, column = (operator.index(place) for place in cell)
+    except (TypeError, ValueError):
+        raise AnytimeError(
+            f"{name} is {cell!r}; a cell is two whole numbers, (row, column)"
+        ) from None
     if not (0 <= row < shape[0] and 0 <= column < shape[1]):
         raise AnytimeError(
             f"{name} cell ({row}, {column}) is outside the map of {shape[0]} rows"
@@ -103,7 +125,7 @@ def _query(
 ) -> tuple[NDArray[np.uint8], int, int]:
     if connectivity not in (4, 8):
         raise AnytimeError(f"connectivity is {connectivity}, it must be 4 or 8")
-    cells = flat(grid, "the map")
+    cells = flat_free(grid, "the map") if wall == 0 else flat(grid, "the map")
     ends = []
     for cell, name in ((start, "start"), (goal, "goal")):
         index = index_of(cell, grid.shape, name)
@@ -150,6 +172,8 @@ def _read_back(
     if cost < 0:
         raise TimeoutError(f"no shortest path known after {expansions} expansions")
     cells = path_to(grid, wall, columns, first, last, diagonals, work)
+    # By a weight, labels that were corrected late make the way cheaper than its last one says.
+    cost = int(way_cost(grid, wall, columns, cells, 0, len(cells) - 1))
     return _path(cells, columns, cost, expansions)
 
 

@@ -14,7 +14,7 @@ from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region
 from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "6d5d228cc203"
+CALLED = "a415f4ba60f0"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9

@@ -13,7 +13,7 @@ from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost
 from planners.region_search import LAST_REGION
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "bbfb3a3b9860"
+CALLED = "d1ca47a35794"
 
 TAUT = 2
 """How often pins are drawn taut."""

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from planners.frontier import path_to, step_between, step_cost, with_room
+from planners.frontier import path_to, way_cost, with_room
 from planners.improving import (
     BASE,
     COUNT,
@@ -16,20 +16,9 @@ from planners.improving import (
     search,
 )
 
-CALLED = "ddae7378744c"
+CALLED = "6a9c016c5e17"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def way_cost(cost, wall, columns, path, first, last):
-    """Cost of the way from its cell number `first` to its cell number `last`."""
-    total = np.int64(0)
-    for place in range(first, last):
-        node, there = np.int64(path[place]), np.int64(path[place + 1])
-        down, across = step_between(node, there, columns)
-        total += step_cost(cost, wall, columns, node, down, across)
-    return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

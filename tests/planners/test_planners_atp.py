@@ -220,6 +220,8 @@ def test_mistakes_are_named():
     domain[0, 0] = np.nan
     with pytest.raises(AnytimeError, match=r"outside \[0, 1\]"):
         list(steps(domain, (1, 1), (8, 8)))
+    with pytest.raises(AnytimeError, match="the domain is bool"):
+        list(steps(np.ones((9, 9), bool), (1, 1), (8, 8)))
     grid = Grid.known(np.ones((9, 9), bool))
     with pytest.raises(AnytimeError, match="not all on the map of 9 rows"):
         grid.update(8, 8, np.zeros((2, 2), np.float32))

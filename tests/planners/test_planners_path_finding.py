@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from anytime.errors import AnytimeError
 from planners import astar, length_of, route, textbook_astar, weighted_astar
-from sensing import OPTIMUM_TOLERANCE, map_folder, read_map, read_scenarios
+from planners.search import bucket_search
+from sensing import OPTIMUM_TOLERANCE, map_folder, read_map, read_scenarios, uniform
 
 STRAIGHT, DIAGONAL = 10_000, 14_142
 
@@ -96,8 +97,7 @@ def test_a_route_over_soft_costs_is_within_its_weight(query, connectivity, weigh
         assert found is None
         return
     assert best <= found.cost <= weight * best
-    # What is read back from the labels may be shorter than the search knew, never longer.
-    assert cost_along(cost, found.cells, connectivity) <= found.cost
+    assert cost_along(cost, found.cells, connectivity) == found.cost
 
 
 @given(queries())
@@ -130,6 +130,9 @@ def test_no_corner_is_cut():
         ((1, 1), (0, 0), r"goal cell \(0, 0\) is blocked"),
         ((1, 1), (3, 0), r"goal cell \(3, 0\) is outside the map of 3 rows and 4 columns"),
         ((-1, 1), (1, 1), r"start cell \(-1, 1\) is outside"),
+        ((1.5, 1), (1, 1), r"start is \(1.5, 1\); a cell is two whole numbers"),
+        ((1, 1), (0, 1, 1), r"goal is \(0, 1, 1\); a cell is two whole numbers"),
+        ((1, 1), None, r"goal is None; a cell is two whole numbers"),
     ],
 )
 def test_a_query_that_makes_no_sense_names_the_cell(start, goal, message):
@@ -147,6 +150,23 @@ def test_other_mistakes_are_named_too():
         weighted_astar(free, (0, 0), (1, 1), 0.5)
     with pytest.raises(AnytimeError, match="the map is float64"):
         astar(np.ones((3, 3)), (0, 0), (1, 1))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(AnytimeError, match="the map is a list"):
+        astar([[True]], (0, 0), (0, 0))  # pyright: ignore[reportArgumentType]
+    with pytest.raises(AnytimeError, match="the map holds 255: give bools"):
+        astar(np.full((3, 3), 255, np.uint8), (0, 0), (1, 1))  # pyright: ignore[reportArgumentType]
+
+
+def test_a_map_that_may_not_be_written_and_one_in_pieces_are_planned_on_by_the_same_kernels():
+    free = uniform(40, 0.2, np.random.default_rng(0))
+    free[0, 0] = free[-1, -1] = True
+    wide = np.repeat(np.repeat(free, 2, axis=0), 2, axis=1)
+    best = astar(free, (0, 0), (39, 39))
+    kernels = len(bucket_search.signatures)
+    for kind in (np.frombuffer(free.tobytes(), bool).reshape(free.shape), wide[::2, ::2], free.T.T):
+        found = astar(kind, (0, 0), (39, 39))
+        assert (found is None) == (best is None)
+        assert found is None or np.array_equal(found.cells, best.cells)
+    assert len(bucket_search.signatures) == kernels
 
 
 def test_a_search_that_may_expand_nothing_says_so():

@@ -5,10 +5,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners import astar, weighted_astar
-from planners.frontier import step_between, step_cost
+from planners.frontier import step_between, step_cost, way_cost
 from planners.improving import COUNT, POSITION, new_run
 from planners.norms import least_norm
-from planners.way_in_hand import improve_windows, way_cost
+from planners.way_in_hand import improve_windows
 from sensing import uniform
 
 
