@@ -14,7 +14,7 @@ import numpy as np
 from anytime.errors import AnytimeError
 from anytime.files import Stored, read_record, write_record
 from anytime.machines import Machine, Rate, processor
-from anytime.pictures import figure
+from anytime.pictures import clipped, figure
 from anytime.profiles import Profile, Recording
 
 PROFILE = "anytime.profile/1"
@@ -110,7 +110,7 @@ class ProfileLibrary(Mapping[str, Profile]):
     def __repr__(self) -> str:
         count = f"{len(self)} profile{'s' if len(self) != 1 else ''}"
         head = f"library of {count}, machine {self.machine.name}"
-        return "\n".join([head, *(f"  {self[name]!r}"[:100] for name in self)])
+        return "\n".join([head, *(clipped(f"  {self[name]!r}") for name in self)])
 
     def _repr_html_(self) -> str:
         pictures = (self[name].picture() for name in self)

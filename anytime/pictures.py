@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 BARS = "▁▂▃▄▅▆▇█"
 # Okabe & Ito's colours, told apart by colour-blind eyes; every series is labelled as well.
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#f0e442", "#000000")
+COLUMNS = 100  # of what is printed, at most
 
 
 def sparkline(values: Sequence[float], low: float = 0.0, high: float = 1.0) -> str:
@@ -32,6 +33,11 @@ def number(value: float) -> str:
         text = f"{value:.2f}"
         return text if text == "1.00" else text.replace("0.", ".", 1)
     return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}"
+
+
+def clipped(line: str) -> str:
+    """A line of at most `COLUMNS`, with a mark where it was cut."""
+    return line if len(line) <= COLUMNS else line[: COLUMNS - 1] + "…"
 
 
 def duration(seconds: float) -> str:

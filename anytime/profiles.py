@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
-from anytime.pictures import duration, figure, line_chart, number, sparkline
+from anytime.pictures import clipped, duration, figure, line_chart, number, sparkline
 from anytime.strata import stratum_weights
 
 Floats = NDArray[np.float64]
@@ -23,8 +23,9 @@ class Recording:
     """One recorded run of a module on one problem.
 
     inputs: achieved quality of what arrived at each parameter that another module feeds.
-    seconds, work, raw, estimates: [n] at each registration, thinned; raw is the quality, or the
-        cost for a module with a cost; estimates are NaN for a module without one.
+    seconds, work, raw, estimates: [n] at each registration, thinned; seconds to the picosecond;
+        raw is the quality, or the cost for a module with a cost; estimates are NaN for a module
+        without one.
     end: seconds, work when the run ended.
     """
 
@@ -38,6 +39,11 @@ class Recording:
     estimates: Floats
     end: tuple[float, float]
     complete: bool
+
+    def __post_init__(self) -> None:
+        # The same steps added in another order differ in the last bit, and are the same moment.
+        object.__setattr__(self, "seconds", np.round(self.seconds, 12))
+        object.__setattr__(self, "end", (round(self.end[0], 12), self.end[1]))
 
 
 @dataclass(frozen=True)
@@ -359,7 +365,7 @@ class Profile:
         if self.condition:
             parts[-1] += f" (n_eff {self.effective_problems:.0f})"
         parts.append(self.machine)
-        return " | ".join(parts)[:100]
+        return clipped(" | ".join(parts))
 
     def _repr_html_(self) -> str:
         return self.picture()

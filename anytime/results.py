@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any, NamedTuple
 
-from anytime.pictures import duration, number
+from anytime.pictures import clipped, duration, number
 
 
 class Status(Enum):
@@ -76,4 +76,4 @@ class Result:
             lines.append(f"  fault: {self.fault}")
         if self.why:
             lines.append(f"  {self.why}")
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)

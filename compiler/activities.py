@@ -13,6 +13,7 @@ import numpy as np
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
 from anytime.modules import Module
+from anytime.pictures import clipped
 from anytime.results import Result
 from compiler.compiled import CompiledProgram
 from compiler.division import divide
@@ -130,7 +131,7 @@ class Activity:
 
     def __repr__(self) -> str:
         state = "closed" if self._closed else self.why
-        return f"<activity of {self._program.name}, {self.calls} calls: {state}>"[:100]
+        return clipped(f"<activity of {self._program.name}, {self.calls} calls: {state}>")
 
 
 def _alike(one: float, other: float) -> bool:

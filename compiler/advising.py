@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anytime.pictures import duration, number
+from anytime.pictures import clipped, duration, number
 from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.division import Frontier, divide
 from compiler.explaining import shares_at
@@ -64,7 +64,7 @@ class Advice:
                 f"  {change.gain:+.3f}{sure}  {change.label} {change.what}: "
                 f"{number(change.promised)}"
             )
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)
 
 
 @dataclass(frozen=True)

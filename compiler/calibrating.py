@@ -15,14 +15,14 @@ from compiler.certificates import best_so_far
 from compiler.costs import stretched
 from compiler.division import Frontier, divide, expected_quality, moments_within, value_of
 from compiler.intervals import mean_interval
-from compiler.objectives import Objective
+from compiler.objectives import EXPECTED, Objective
 from compiler.replaying import Replay
 from compiler.tables import Table, tables
 
 Floats = NDArray[np.float64]
 RUN = 40  # divisions that are really run to calibrate a program
-BOOTSTRAPPED = 8  # budgets at which intervals are found by bootstrap
-RESAMPLES = 60  # of the problems, for these
+RESAMPLED = 8  # budgets at which intervals are found from the tables of some of the problems
+RESAMPLES = 60  # of those tables, at most
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
 DIVIDED = 3  # calls at most of programs that are divided anew for each fold
 KNOTS = 96  # budgets at which promises are calibrated; fewer for many calls
@@ -78,7 +78,8 @@ def calibrate(
     replay: Replay,
     seed: int = 0,
 ) -> tuple[Frontier, Calibration]:
-    """The divisions of a frontier that stand when they are lived again, and what they may promise.
+    """The divisions of a frontier that stand when they are lived again, and what may be promised
+    for what the tables say of them (`Calibration.applied`).
 
     Cross-fitting: each fold of the problems lives (`compiler.replaying`) the divisions that were
     chosen without it. One that is worse there than another with less time gives way to that other
@@ -89,15 +90,15 @@ def calibrate(
     values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
     standing = _standing(values)
     frontier, knots, values = _stretched(frontier, knots, values, standing, replay)
-    calibration = _isotonic(frontier.promised[knots], values)
-    return calibration.applied(frontier), calibration
+    return frontier, _isotonic(frontier.promised[knots], values)
 
 
 def calibrate_by_running(
     tables: Sequence[Table], frontier: Frontier, run: Callable[[Sequence[float]], Floats]
 ) -> tuple[Frontier, Calibration]:
-    """The same from really running a program: run(budgets) gives qualities [P, budgets] on
-    problems that the divisions were not chosen on.
+    """The divisions that stand when a program is really run, with their promises, and the
+    calibration: run(budgets) gives qualities [P, budgets] on problems that the divisions were not
+    chosen on.
 
     In a long program neighbouring divisions may be worth very different qualities, for tables do
     not tell all that goes on between modules. So only divisions that were run are kept, each that
@@ -165,21 +166,32 @@ def as_tables_say(
     objective: Objective,
     seed: int = 0,
 ) -> Calibration:
-    """What the tables say is promised; intervals by bootstrap over problems. For programs that
-    cannot be lived again on recordings: with branches, loops, parallels, other objectives."""
+    """What the tables say is promised. For programs that cannot be lived again on recordings: with
+    branches, parallels, several outputs, or for other objectives.
+
+    Intervals of an expected quality are those of the mean of the problems' shares in it, which
+    leaving them out one by one tells (the jackknife's pseudo-values, Tukey 1958); of what is no
+    mean, by bootstrap over problems.
+    """
     problems = sorted({p for profile in profiles.values() for p in profile.problems})
     rng = np.random.default_rng(seed)
-    knots = _knots(frontier, BOOTSTRAPPED)
-    sampled = np.zeros((RESAMPLES, len(knots)))
-    for row in range(RESAMPLES):
-        drawn = rng.integers(0, len(problems), size=len(problems))
-        counts = Counter(problems[int(index)] for index in drawn)
-        resampled = tables(program, profiles, counts)
-        for column, knot in enumerate(knots):
-            moments = moments_within(resampled, frontier.shares[knot].tolist())
-            sampled[row, column] = value_of(resampled, moments, objective)
-    low, high = np.quantile(sampled, [0.025, 0.975], axis=0)
+    knots = _knots(frontier, RESAMPLED)
+
+    def said_of(counts: Mapping[str, float]) -> list[float]:
+        again = tables(program, profiles, counts)
+        shares = [frontier.shares[knot].tolist() for knot in knots]
+        return [value_of(again, moments_within(again, row), objective) for row in shares]
+
     said = frontier.promised[knots]
+    if objective == EXPECTED and len(problems) > 1:
+        groups = np.array_split(rng.permutation(problems), min(len(problems), RESAMPLES))
+        without = [said_of({p: float(p not in group) for p in problems}) for group in groups]
+        values = len(groups) * said - (len(groups) - 1) * np.array(without)
+        low, high = mean_interval(np.clip(values, 0.0, 1.0))
+    else:
+        drawn = [rng.integers(0, len(problems), len(problems)) for _ in range(RESAMPLES)]
+        sampled = [said_of(Counter(problems[int(index)] for index in each)) for each in drawn]
+        low, high = np.quantile(sampled, [0.025, 0.975], axis=0)
     low = np.minimum(np.minimum.accumulate(low[::-1])[::-1], said)
     return Calibration(said, said, low, np.maximum(np.maximum.accumulate(high), said))
 

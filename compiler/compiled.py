@@ -13,6 +13,7 @@ import numpy as np
 from anytime import running
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
+from anytime.joins import Several
 from anytime.modules import Module
 from anytime.pictures import duration, figure
 from anytime.profiles import Profile
@@ -129,7 +130,17 @@ class CompiledProgram:
 
     @cached_property
     def module(self) -> Module:
-        """This program as a contract module, to be called in other programs."""
+        """This program as a contract module, to be called in other programs.
+
+        Raises AnytimeError where its output is not the result of modules that are scored alike:
+        several outputs, or the answer of `all_of` or `any_of`.
+        """
+        scored = makers(self.program.output)
+        if not scored or isinstance(getattr(self.program.output, "rule", None), Several):
+            raise AnytimeError(
+                f"program {self.name!r} cannot be a module, which has one result of one quality: "
+                f"it returns {'several outputs' if scored else 'the answer of tests'}"
+            )
 
         def contract(*inputs: Any, seconds: float) -> Any:
             named = dict(zip(self.program.inputs, inputs, strict=True))
@@ -137,7 +148,7 @@ class CompiledProgram:
             deadline = running.here().deadline
             return self.run(deadline=deadline.sooner(seconds), **named).value
 
-        scorer = makers(self.program.output)[0].module
+        scorer = scored[0].module
         return Module(
             self.name,
             contract,

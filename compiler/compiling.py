@@ -61,15 +61,14 @@ def compile(
     steps = guards_of(profiles)
     replay = None
     if _in_a_row(program, Best) and objective == EXPECTED:
-        # On the machine of the profiles, so that a faster one never promises less.
-        there = made if machine is None else tables(program, measured)
-        known = frontier if machine is None else divide(there)
-        guards = guards_of(measured)
-        replay = replay_of(program, measured, guards, there, seed)
-        lived, calibration = calibrate(program, measured, known, replay, seed)
-        frontier = lived if machine is None else calibration.applied(frontier)
+        replay = replay_of(program, profiles, steps, made, seed)
+        frontier, calibration = calibrate(program, profiles, frontier, replay, seed)
         if machine is not None:
-            replay = replay_of(program, profiles, steps, made, seed)
+            # Promised as on the machine of the profiles, so that a faster one never promises less.
+            there = tables(program, measured)
+            lives = replay_of(program, measured, guards_of(measured), there, seed)
+            _, calibration = calibrate(program, measured, divide(there), lives, seed)
+        frontier = calibration.applied(frontier)
     else:
         calibration = as_tables_say(program, profiles, frontier, objective, seed)
     policy = None

@@ -320,7 +320,7 @@ def _certain(table: Table) -> bool:
 
 def _best_first(totals: Floats, values: Floats, floor: float) -> NDArray[np.intp]:
     """Places of the divisions worth more than `floor` and than any as fast, in order of time."""
-    order = np.lexsort((-values, totals))
+    order = np.lexsort((-values, totals.round(12)))  # sums of the same times may differ by a bit
     ordered = values[order]
     before = np.maximum.accumulate(np.concatenate([[floor], ordered[:-1]]))
     return order[ordered > before + 1e-9]

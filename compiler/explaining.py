@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from anytime.pictures import duration, figure, line_chart, number, sparkline
+from anytime.pictures import clipped, duration, figure, line_chart, number, sparkline
 from anytime.programs import Program
 from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.costs import stretched
@@ -77,7 +77,7 @@ class Explanation:
                 f"{price.gain:>+13.4f}  {price.a_second:>+8.2f}  {sparkline(price.shares)}"
             )
         lines.append(self.decided or certificate(self.regret))
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)
 
     def _repr_html_(self) -> str:
         """Shares against the budget, one above the other."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from anytime.errors import AnytimeError
 from anytime.modules import Module
-from anytime.pictures import duration, figure, line_chart, number
+from anytime.pictures import clipped, duration, figure, line_chart, number
 from anytime.profiles import Profile
 from anytime.programs import Call, Input
 from compiler.compiled import CompiledProgram
@@ -73,7 +73,7 @@ class Interruptible(Module):
                 lines.append(f"{done}   {number(self.promise(end)):>8}")
             bound = "" if math.isinf(self.ratio) else f"; at worst {self.ratio:.3g} × one contract"
             lines.append(f"{expected}, by doubling {number(self.doubling)}{bound}")
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)
 
     def _repr_html_(self) -> str:
         end = max(run.end[0] for run in self.profile.recordings)

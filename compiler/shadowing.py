@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from anytime.pictures import duration, number
+from anytime.pictures import clipped, duration, number
 from anytime.programs import Program
 from anytime.shadow import Shadow
 from anytime.shadowed import shadowed
@@ -53,7 +53,7 @@ class ShadowAdvice:
             "cannot be known from this:",
             *(f"  {line}" for line in self.unknown),
         ]
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)
 
 
 def advise(shadow: Shadow) -> ShadowAdvice:

@@ -6,29 +6,35 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anytime.pictures import duration, line_chart, number
+from anytime.pictures import COLUMNS, clipped, duration, line_chart, number
 from compiler import baselines
 from compiler.allocations import Allocation
 from compiler.explaining import certificate
 from compiler.tables import Table
 
+ROOM, MORE = COLUMNS - 38, 3  # columns for the shares; for the mark that there are more
+
 
 def text_of(
     title: str, rows: Sequence[tuple[Allocation, tuple[float, float]]], regret: float
 ) -> str:
-    """Shares and promises with their 95 % intervals, a row a budget, in at most 100 columns."""
+    """Shares and promises with their 95 % intervals, a row a budget, in at most 100 columns: of
+    many calls the first ones."""
     labels = list(rows[0][0].shares)
     width = max(12, *(len(label) + 2 for label in labels))
-    header = "".join(f"{label:>{width}}" for label in labels)
-    lines = [title, f"{'budget':>10}{header}   promised  95 %"]
+    shown = len(labels) if len(labels) * width <= ROOM else max(1, (ROOM - MORE) // width)
+    more = "" if shown == len(labels) else f"{'…':>{MORE}}"
+    header = "".join(f"{label:>{width}}" for label in labels[:shown])
+    lines = [title, f"{'budget':>10}{header}{more}   promised  95 %"]
     for allocation, (low, high) in rows:
-        shares = "".join(f"{duration(s):>{width}}" for s in allocation.shares.values())
+        seconds = [*allocation.shares.values()][:shown]
+        shares = "".join(f"{duration(s):>{width}}" for s in seconds) + more
         lines.append(
             f"{duration(allocation.seconds):>10}{shares}   {number(allocation.promised):>8}"
             f"  [{number(low)}, {number(high)}]"
         )
     lines.append(certificate(regret))
-    return "\n".join(line[:100] for line in lines)
+    return "\n".join(clipped(line) for line in lines)
 
 
 def picture_of(name: str, tables: Sequence[Table], allocations: Sequence[Allocation]) -> str:

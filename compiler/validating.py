@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
 from anytime.measuring import measure, problem_keys
-from anytime.pictures import duration, figure, line_chart, number
+from anytime.pictures import clipped, duration, figure, line_chart, number
 from anytime.programs import Call, Input, Program, upstream
 from anytime.results import Change, Result
 from anytime.running import seed_of
@@ -97,7 +97,7 @@ class Validation:
             )
         lines.append("  ░ promised 95 %   │ promised   ● achieved")
         lines += [f"  {finding}" for finding in self.findings]
-        return "\n".join(line.rstrip()[:100] for line in lines)
+        return "\n".join(clipped(line.rstrip()) for line in lines)
 
     def _repr_html_(self) -> str:
         """Reliability: achieved over promised, with the interval of what is achieved."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from anytime.errors import AnytimeError
-from anytime.pictures import duration, sparkline
+from anytime.pictures import clipped, duration, sparkline
 from monitor.endings import Ending
 from monitor.states import Decision, Situation
 
@@ -159,4 +159,4 @@ class Report:
         ]
         if self.fault:
             lines.append(f"  fault: {self.fault}")
-        return "\n".join(line[:100] for line in lines)
+        return "\n".join(clipped(line) for line in lines)

@@ -100,6 +100,16 @@ def test_a_faster_module_never_promises_less_after_calibration():
             assert quick.promise(budget) >= normal.promise(budget) - 1e-9
 
 
+@pytest.mark.parametrize("name", ["hard", "gated tree", "either"])
+def test_on_the_machine_of_its_profiles_a_program_is_the_same(name):
+    program = FAMILIES[name]()
+    library = measure(program, cases(25, 3), seconds=0.06, clock=lambda: WorkClock(MACHINE))
+    here, there = compile(program, library), compile(program, library, machine=MACHINE)
+    assert np.allclose(here.frontier.budgets, there.frontier.budgets, rtol=1e-9)
+    assert np.allclose(here.frontier.shares, there.frontier.shares, atol=1e-12)
+    assert np.allclose(here.frontier.promised, there.frontier.promised)
+
+
 # Living a division again
 
 

@@ -211,6 +211,29 @@ def test_the_arms_of_a_parallel_take_the_time_of_the_longest(schedules):
     assert result.elapsed == pytest.approx(spent + result.parts["join"].elapsed)
 
 
+@pytest.mark.parametrize("function", [at_once, shared_processor])
+def test_each_arm_of_a_parallel_has_its_share_at_every_budget(schedules, function):
+    """What one arm needs for its first result is no part of the other's time."""
+    schedule = schedules[function]
+    for seconds in schedule.frontier.budgets.tolist():
+        shares, found = schedule.allocate(seconds).shares, run(schedule, seconds, DAY)
+        assert found
+        assert all(found.parts[label].elapsed <= share + 1e-9 for label, share in shares.items())
+        lived = np.mean([run(schedule, seconds, scene).value or 0.0 for scene in SCENES])
+        assert lived >= schedule.promise(seconds) - 0.02
+
+
+def test_promises_of_few_problems_are_unsure_whatever_the_program_is_made_of(schedules):
+    for function in (either, at_once):
+        low, high = schedules[function].interval(1.0)
+        assert high - low > 1.0 / len(SCENES)
+
+
+def test_what_returns_several_results_or_an_answer_is_no_module(schedules):
+    with pytest.raises(AnytimeError, match="it returns several outputs"):
+        _ = schedules[two].module
+
+
 def test_arms_that_share_a_processor_follow_each_other(schedules):
     result = run(schedules[shared_processor], 1.0, DAY)
     assert result.elapsed == pytest.approx(sum(part.elapsed for part in result.parts.values()))
