@@ -17,7 +17,7 @@ from anytime.joins import Several
 from anytime.modules import Module
 from anytime.pictures import duration, figure
 from anytime.profiles import Profile
-from anytime.programs import Program, makers
+from anytime.programs import Join, Program, makers
 from anytime.results import Result, Status
 from compiler.adaptive import ceiling
 from compiler.advising import Advice, advise
@@ -135,8 +135,9 @@ class CompiledProgram:
         Raises AnytimeError where its output is not the result of modules that are scored alike:
         several outputs, or the answer of `all_of` or `any_of`.
         """
-        scored = makers(self.program.output)
-        if not scored or isinstance(getattr(self.program.output, "rule", None), Several):
+        output = self.program.output
+        scored = makers(output)
+        if not scored or (isinstance(output, Join) and isinstance(output.rule, Several)):
             raise AnytimeError(
                 f"program {self.name!r} cannot be a module, which has one result of one quality: "
                 f"it returns {'several outputs' if scored else 'the answer of tests'}"

@@ -219,8 +219,6 @@ def test_each_arm_of_a_parallel_has_its_share_at_every_budget(schedules, functio
         shares, found = schedule.allocate(seconds).shares, run(schedule, seconds, DAY)
         assert found
         assert all(found.parts[label].elapsed <= share + 1e-9 for label, share in shares.items())
-        lived = np.mean([run(schedule, seconds, scene).value or 0.0 for scene in SCENES])
-        assert lived >= schedule.promise(seconds) - 0.02
 
 
 def test_promises_of_few_problems_are_unsure_whatever_the_program_is_made_of(schedules):
