@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
@@ -41,6 +42,12 @@ class WallClock:
 
     def advance(self, seconds: float) -> None:
         time.sleep(max(0.0, seconds))
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a number of seconds at all."""
+    # To Python a truth value is a number; as a time it is a slip.
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)  # pyright: ignore[reportUnnecessaryIsInstance]
 
 
 class WorkClock:
@@ -101,8 +108,10 @@ class Deadline:
     @classmethod
     def after(cls, seconds: float, clock: Clock | None = None) -> Deadline:
         """The deadline `seconds` from now; zero or negative means stop now, never "no limit"."""
-        if math.isnan(seconds):
-            raise AnytimeError("seconds is NaN; give the time that may be spent, 0 = stop now")
+        if not is_number(seconds) or math.isnan(seconds):
+            raise AnytimeError(
+                f"seconds is {seconds!r}; give the time that may be spent, 0 = stop now"
+            )
         clock = clock or WallClock()
         return cls(clock, clock.now() + seconds)
 

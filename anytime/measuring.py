@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import itertools
+import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -16,7 +17,7 @@ import numpy as np
 
 from anytime import executors
 from anytime.campaigns import lived
-from anytime.clocks import Clock, WallClock, WorkClock
+from anytime.clocks import Clock, WallClock, WorkClock, is_number
 from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine, Rate, charged_rate, processor, stepped_rate
@@ -38,7 +39,7 @@ def measure(
     rest: float = 0.0,
     seed: int = 0,
     executor: Executor | str | None = None,
-    store: Path | None = None,
+    store: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     until: Callable[[ProfileLibrary], bool] | None = None,
 ) -> ProfileLibrary:
@@ -74,8 +75,14 @@ def measure(
     listed = list(problems)
     if not listed:
         raise AnytimeError("no problems to measure on; give at least one")
-    if not seconds > 0:
-        raise AnytimeError(f"seconds={seconds}; give the time that each run may take, > 0")
+    if not is_number(seconds) or not seconds > 0:
+        raise AnytimeError(f"seconds={seconds!r}; give the time that each run may take, > 0")
+    if not is_number(rest) or not 0 <= rest < math.inf:
+        raise AnytimeError(f"rest={rest!r}; give the idle seconds before each run, >= 0")
+    if not callable(clock):
+        raise AnytimeError(
+            f"clock={clock!r}; give what makes a run's clock, like `lambda: WorkClock(machine)`"
+        )
     keys = problem_keys(program, listed)
     named = dict(zip(keys, listed, strict=True))
     how = How(seconds, clock, rest, seed)
@@ -87,7 +94,8 @@ def measure(
         watch = None
         if until is not None:
             watch = _Watch(keys, lambda good: until(_library(program, good, known)))
-        found = _campaign(program, named, how, executor or "serial", store, progress, watch)
+        file = None if store is None else Path(store)
+        found = _campaign(program, named, how, executor or "serial", file, progress, watch)
     return _library(program, found, known)
 
 

@@ -241,6 +241,8 @@ class Profile:
         The monotone envelope (the best expectation with that time or less), or as measured.
         """
         times = np.atleast_1d(np.asarray(seconds, dtype=float))
+        if np.isnan(times).any():
+            raise AnytimeError("seconds holds NaN; give times")
         changes, measured = self._course
         known = measured if as_measured else np.maximum.accumulate(measured)
         return known[np.searchsorted(changes, times, side="right")]
@@ -361,9 +363,8 @@ class Profile:
             parts.append("given " + ", ".join(f"{k}={v:.2g}" for k, v in self.condition.items()))
         elif self.inputs:
             parts.append("given " + ", ".join(self.inputs))
-        parts.append(f"{len(self.problems)} problems, {len(self.recordings)} runs")
-        if self.condition:
-            parts[-1] += f" (n_eff {self.effective_problems:.0f})"
+        as_many = f" as {self.effective_problems:.0f}" if self.condition else ""
+        parts.append(f"{len(self.problems)} problems{as_many}, {len(self.recordings)} runs")
         parts.append(self.machine)
         return clipped(" | ".join(parts))
 

@@ -93,4 +93,5 @@ def export(options: argparse.Namespace) -> Answer:
     if options.tables is not None:
         write_json(tables, options.tables)
     written = ", ".join(str(file) for file in (options.c, options.tables) if file is not None)
-    return Answer(f"{len(tables.from_ms)} divisions of {tables.name} written to {written}")
+    count = len(tables.from_ms)
+    return Answer(f"{count} division{'s' * (count != 1)} of {tables.name} written to {written}")

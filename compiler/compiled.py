@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anytime import running
-from anytime.clocks import Clock, Deadline, WallClock
+from anytime.clocks import Clock, Deadline, WallClock, is_number
 from anytime.errors import AnytimeError
 from anytime.joins import Several
 from anytime.modules import Module
@@ -78,7 +78,7 @@ class CompiledProgram:
     def promise(self, seconds: float) -> float:
         """What the result is worth for a budget: its expected quality, unless it was compiled for
         another objective; 0 below the least budget."""
-        plan = self._plan(seconds)
+        plan = self._plan(_finite(seconds))
         worth = self.frontier.promise(seconds)
         return self.calibration.promise(plan.value) if plan else worth
 
@@ -87,7 +87,7 @@ class CompiledProgram:
         exact, else the value of a policy that sees what every call achieves; 1 where even that
         is out of reach."""
         if self.frontier.exact:
-            return self.promise(seconds)
+            return self.promise(_finite(seconds))
         bound = ceiling(self.program, self.tables, _finite(seconds), self.objective)
         return max(self.promise(seconds), 1.0 if bound is None else self.calibration.promise(bound))
 
@@ -309,6 +309,8 @@ class CompiledProgram:
     def advise(self, seconds: float) -> Advice:
         """Which module is worth making faster or better at this budget."""
         seconds = _finite(seconds)
+        if seconds <= 0:
+            raise AnytimeError(f"a budget of {seconds} s; give one > 0 to be advised on")
         return advise(self.name, self.tables, self.frontier, seconds, self.calibration, self.replay)
 
     def validate(
@@ -377,6 +379,6 @@ def _check_inputs(program: Program, inputs: Mapping[str, Any]) -> None:
 
 
 def _finite(seconds: float) -> float:
-    if not seconds > -np.inf or not seconds < np.inf:
-        raise AnytimeError(f"a budget of {seconds} s; give a finite number of seconds")
+    if not is_number(seconds) or not -np.inf < seconds < np.inf:
+        raise AnytimeError(f"a budget of {seconds!r} s; give a finite number of seconds")
     return float(seconds)

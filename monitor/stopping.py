@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from anytime.clocks import is_number
 from anytime.errors import AnytimeError
 
 Floats = NDArray[np.float64]
@@ -54,8 +55,10 @@ class Task:
     look: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0 <= self.look < math.inf:
-            raise AnytimeError(f"look is {self.look}; it must be a finite number >= 0")
+        if not callable(self.utility):
+            raise AnytimeError(f"utility is {self.utility!r}; give a function of quality, seconds")
+        if not is_number(self.look) or not 0 <= self.look < math.inf:
+            raise AnytimeError(f"look is {self.look!r}; it must be a finite number >= 0")
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,8 @@ class Runs:
     seen: Floats
 
     def __post_init__(self) -> None:
+        for name in ("seconds", "quality", "seen"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
         if self.quality.ndim != 2 or self.quality.shape != self.seen.shape:
             raise AnytimeError("quality and seen must have the same shape, [runs, times]")
         if self.seconds.shape != self.quality.shape[1:] or self.quality.size == 0:
@@ -91,8 +96,18 @@ class Runs:
         return Runs(self.seconds, self.quality[rows], self.seen[rows])
 
     def utilities(self, task: Task) -> Floats:
-        """What stopping at each time would be worth, [N, T]."""
-        return np.asarray(task.utility(self.quality, self.seconds[None, :]), dtype=float)
+        """What stopping at each time would be worth, [N, T].
+
+        Raises AnytimeError for a utility that is no finite number for each quality and time.
+        """
+        found = np.asarray(task.utility(self.quality, self.seconds[None, :]), dtype=float)
+        if found.shape != self.quality.shape or not np.isfinite(found).all():
+            raise AnytimeError(
+                "utility must give a finite number for each quality and time: "
+                f"[runs, times] = {list(self.quality.shape)}, and it gave {list(found.shape)}"
+                f"{'' if np.isfinite(found).all() else ' with some that are not finite'}"
+            )
+        return found
 
 
 Learner = Callable[[Runs, Task], StoppingRule]
@@ -134,11 +149,11 @@ def _stop(rule: StoppingRule, seconds: Floats, seen: Floats) -> tuple[int, int]:
         answer = rule(History(seconds[: now + 1], seen[: now + 1]))
         base = seconds[now] if now >= 0 else 0.0
         if isinstance(answer, Stop):
-            if not 0 <= answer.after < math.inf:
-                raise AnytimeError(f"a rule stops after {answer.after} s; it must be >= 0")
+            if not is_number(answer.after) or not 0 <= answer.after < math.inf:
+                raise AnytimeError(f"a rule stops after {answer.after!r} s; it must be >= 0")
             return _index(seconds, base + answer.after, 0), looks
-        if not answer > 0:
-            raise AnytimeError(f"a rule returned {answer}; return seconds > 0, or STOP")
+        if not is_number(answer) or not answer > 0:
+            raise AnytimeError(f"a rule returned {answer!r}; return seconds > 0, or STOP")
         now = _index(seconds, base + answer, now + 1)
         looks += 1
         if now >= last:

@@ -197,6 +197,9 @@ class Briefing:
             return report  # would not be the same again
 
         def again(frame: int, shares: Mapping[str, float], speed: float | None) -> Report:
+            slow, fast = self.grid.mission.speeds
+            if speed is not None and not slow <= speed <= fast:
+                raise AnytimeError(f"speed is {speed}; the mission has {slow} to {fast} cells/s")
             other = replace(monitor, policy=forked(monitor.policy, frame, shares, speed))
             return self.live(other, seed)
 

@@ -35,6 +35,9 @@ def compare(
     Raises AnytimeError for two of different kinds, and for programs of other modules.
     """
     grid = replace(grid, mission=grid.mission.known(0.0))  # judged as it is presented
+    for path in (before, after):
+        if not path.exists():
+            raise AnytimeError(f"{path}: no such file or folder")
     if before.is_dir() != after.is_dir():
         raise AnytimeError(
             f"{before} and {after}: one is a folder of profiles and one is not; give two folders "

@@ -15,6 +15,7 @@ from anytime.machines import Machine
 from monitor.missions import Energy, Mission, News, Value
 from monitor.robots.grid import Scene
 from planners.path_finding import Cell
+from planners.touring import MOST_GOALS
 from sensing import corner_to_corner, read_map
 from sensing.camera import Camera
 from sensing.vision import Device, Vision
@@ -64,7 +65,7 @@ class _World(_Section):
     map: str
     start: tuple[int, int] | None = None
     goal: tuple[int, int] | None = None
-    goals: tuple[tuple[int, int], ...] = ()
+    goals: tuple[tuple[int, int], ...] | None = None
     radius: int = 32
     frame: float = 16.0
     density: float = 0.2
@@ -97,7 +98,7 @@ REFERENCE = Machine("reference").with_rate("see", 0.25).with_rate("find_path", 0
 
 
 def read_mission(
-    path: Path,
+    path: str | Path,
     *,
     map_path: Path | None = None,
     start: Cell | None = None,
@@ -108,10 +109,15 @@ def read_mission(
     The map's path is relative to the mission's file. Raises AnytimeError, in one line with the
     path, for whatever is wrong.
     """
+    path = Path(path)
     file = _parse(path)
     floor = read_map(map_path or path.parent / file.world.map)
     replaced = map_path is not None
     begin = start or (None if replaced else file.world.start)
+    if file.world.goals is not None and not file.world.goals:
+        raise AnytimeError(
+            f"{path}: world: goals is empty; a mission has 1 to {MOST_GOALS} different goals"
+        )
     if file.world.goal and file.world.goals:
         raise AnytimeError(f"{path}: world: it has a goal and goals; give one of them")
     named = file.world.goals or ((file.world.goal,) if file.world.goal else ())

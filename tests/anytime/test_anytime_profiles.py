@@ -427,7 +427,7 @@ def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good
 def test_the_text_says_how_many_problems_a_condition_leaves():
     runs_ = tuple(recording(f"p{i}", [0.5], features={"density": float(i)}) for i in range(9))
     text = repr(Profile("see", (), runs_).given(density=0.0))
-    assert "given density=0 | 9 problems, 9 runs (n_eff 3" in text
+    assert "given density=0 | 9 problems as 3, 9 runs" in text
 
 
 def test_a_distribution_is_what_its_weights_say():

@@ -107,7 +107,7 @@ def test_another_decision_leaves_what_came_before_it_as_it_was(briefing, tmp_pat
         ({"frame": 99, "see": 1.0}, "the mission had frames 0 to"),
         ({"frame": 1, "hear": 1.0}, "no call 'hear' to fork; there are see, find_path"),
         ({"frame": 1, "see": -1.0}, "it must be a finite number >= 0"),
-        ({"frame": 1, "speed": 0.0}, "it must be a finite number > 0"),
+        ({"frame": 1, "speed": 0.0}, "the mission has 1.0 to 10.0 cells/s"),
     ],
 )
 def test_what_cannot_be_forked_is_refused_in_one_line(briefing, fork, message):

@@ -71,6 +71,7 @@ def test_a_mission_has_one_goal_or_several_to_visit_in_the_best_order(tmp_path):
     ("goals", "told"),
     [
         ("goal = [148, 228]\ngoals = [[98, 56]]", "it has a goal and goals; give one of them"),
+        ("goals = []", "goals is empty; a mission has 1 to 8"),
         ("goals = [[98, 56], [98, 56]]", "2 goals, 1 of them different"),
         ("goals = [[98, 56], [0, 0]]", r"goal \(0, 0\) is inside an obstacle"),
     ],

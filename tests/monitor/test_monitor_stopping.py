@@ -107,7 +107,9 @@ def test_seconds_count_from_the_last_look():
     assert set(stop_runs(rule, runs, TASK).seconds) == {3.0}
 
 
-@pytest.mark.parametrize("answer", [0.0, -1.0, float("nan"), Stop(-1.0), Stop(float("inf"))])
+@pytest.mark.parametrize(
+    "answer", [0.0, -1.0, float("nan"), None, True, Stop, Stop(-1.0), Stop(float("inf"))]
+)
 def test_what_is_no_time_is_refused(answer):
     with pytest.raises(AnytimeError, match="a rule"):
         stop_runs(lambda history: answer, recorded(), TASK)
@@ -201,6 +203,14 @@ def test_scale_of_what_is_seen_is_learnt():
 def test_runs_that_do_not_fit_are_refused(seconds, quality, message):
     with pytest.raises(AnytimeError, match=message):
         Runs(seconds, quality, quality)
+
+
+@pytest.mark.parametrize("utility", [lambda q, t: 5.0, lambda q, t: q * np.nan])
+def test_a_utility_must_be_a_finite_number_at_every_time(utility):
+    with pytest.raises(AnytimeError, match="utility must give a finite number for each"):
+        fixed_contract(recorded(), Task(utility))
+    with pytest.raises(AnytimeError, match="give a function"):
+        Task(None)  # pyright: ignore[reportArgumentType]
 
 
 def test_what_was_seen_is_as_much_as_there_was_and_finite():

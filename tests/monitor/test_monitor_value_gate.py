@@ -70,8 +70,13 @@ def test_the_command_refuses_what_cannot_be_compared_in_one_line(tmp_path, capsy
     shipped.profiles().save(tmp_path / "before")
     (tmp_path / "empty").mkdir()
     mission = ["--mission", str(shipped.mission_path())]
-    for after in ("empty", "missing.schedule"):
+    (tmp_path / "some.schedule").touch()
+    for after, says in (
+        ("empty", "profile"),
+        ("missing.schedule", "no such file or folder"),
+        ("some.schedule", "one is a folder"),
+    ):
         code = main(["compare", str(tmp_path / "before"), str(tmp_path / after), *mission])
         told = capsys.readouterr()
         assert (code, told.out, told.err.count("\n")) == (2, "", 1)
-    assert "one is a folder" in told.err
+        assert says in told.err
