@@ -350,7 +350,7 @@ def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool
 
 def _result(current: Run, complete: bool, fault: Fault | None) -> Result:
     now = current.deadline.clock.now()
-    overrun = max(0.0, now - max(current.deadline.at, current.started))
+    overrun = round(max(0.0, now - max(current.deadline.at, current.started)), 12)
     if not current.history:
         status = Status.NO_RESULT
     elif complete and fault is None:

@@ -274,7 +274,7 @@ class CompiledProgram:
             None if output is None else output.value,
             fault,
             now - execution.started,
-            max(0.0, now - max(deadline.at, execution.started)),
+            round(max(0.0, now - max(deadline.at, execution.started)), 12),
             last.history if output is not None and last is not None else (),
             sum(part.work for part in parts.values()),
             dict(parts),

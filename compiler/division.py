@@ -45,6 +45,10 @@ class Frontier:
     promised: Floats
     exact: bool = True
 
+    def __post_init__(self) -> None:
+        # To the picosecond, as the moments of recordings are.
+        object.__setattr__(self, "budgets", np.round(self.budgets, 12))
+
     def index(self, seconds: float) -> int:
         """The best division for this budget; -1 when it is below the least one."""
         return int(np.searchsorted(self.budgets, seconds + 1e-12, side="right")) - 1
