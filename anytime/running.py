@@ -218,6 +218,8 @@ def run(
         )
     if (seconds is None) == (deadline is None):
         raise AnytimeError(f"give seconds=… or deadline=… to run {module.name!r}, one of them")
+    if deadline is not None and not isinstance(deadline, Deadline):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"deadline is {deadline!r}; give Deadline.after(seconds), or seconds=…")
     ends = bounded(seconds, deadline)
     return execute(module, inputs, ends, rng=rng, memory=memory, observe=on_result)[0]
 

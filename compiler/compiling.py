@@ -48,6 +48,13 @@ def compile(
         raise AnytimeError(
             f"compile takes a program, not {program!r}; decorate a function with @compiler.program"
         )
+    for name, given, kind, wanted in (
+        ("library", library, Mapping, "profiles by module name, as `measure` returns them"),
+        ("machine", machine, Machine | None, "a Machine"),
+        ("objective", objective, Objective, "compiler.expected() or one of its like"),
+    ):
+        if not isinstance(given, kind):
+            raise AnytimeError(f"{name} is {given!r}; give {wanted}")
     measured = profiles = _needed(program, library)
     if machine is not None:
         profiles = {name: profile.on(machine) for name, profile in measured.items()}

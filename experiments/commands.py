@@ -163,7 +163,8 @@ def reproduce(options: argparse.Namespace) -> Answer:
 
 
 def warm_up(options: argparse.Namespace) -> Answer:
-    """Compile every kernel that a mission needs; machine code is kept between processes."""
+    """Compile every kernel that missions and planners need; machine code is kept between
+    processes."""
     import numpy as np
 
     from anytime import WorkClock, measure
@@ -172,8 +173,16 @@ def warm_up(options: argparse.Namespace) -> Answer:
     from monitor.robots.grid import Scene
     from monitor.robots.grid_missions import REFERENCE
     from monitor.robots.navigation import frame_problems, navigate
+    from planners import Grid, ara, astar, steps
+    from sensing import instance
 
     elimination.warm_up()
+    for family in ("r20", "rooms"):  # one is searched by its density, the other by its regions
+        free, start, goal = instance(family, 128, 0)
+        astar(free, start, goal)
+        for grid in (Grid.known(free), Grid((~free).astype(np.float32))):
+            for planner in (steps, ara.steps):
+                list(planner(grid, start, goal))
     small = domain("r10", 32, 0)
     scene = Scene(small.free, small.start, small.goal, radius=16, frame=8.0)
     frames = list(frame_problems(scene, np.random.default_rng(0), 1))

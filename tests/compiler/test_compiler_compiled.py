@@ -125,6 +125,19 @@ def test_a_budget_is_a_finite_number_of_seconds(schedule, seconds):
             run(schedule, seconds)
 
 
+@pytest.mark.parametrize(
+    ("profiles", "more", "says"),
+    [
+        ("folder", {}, "library is 'folder'; give profiles by module name"),
+        ({}, {"machine": "fast"}, "machine is 'fast'; give a Machine"),
+        ({}, {"objective": "mean"}, "objective is 'mean'; give compiler.expected"),
+    ],
+)
+def test_what_it_is_compiled_from_is_named_where_it_does_not_fit(schedule, profiles, more, says):
+    with pytest.raises(AnytimeError, match=says):
+        compiler.compile(schedule.program, profiles, **more)
+
+
 def test_its_profile_says_what_it_promises(schedule):
     assert len(schedule.profile.recordings) == 20
     for seconds in np.linspace(schedule.least, 0.3, 10):
