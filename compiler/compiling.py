@@ -39,7 +39,7 @@ def compile(
     of its results, by what it shows, where that is worth more.
     The result is a contract program with a profile of its own. The promises of a program of
     calls and alternatives are cross-fitted over problems, with 95 % intervals; those of others are
-    what the tables say, with intervals by bootstrap over problems.
+    what the tables say, with intervals by leaving problems out.
     Raises AnytimeError for a missing or unsuitable profile, before any search.
     """
     if isinstance(program, Module):
