@@ -247,6 +247,7 @@ class CompiledProgram:
             self.steps,
             deadline,
             inputs,
+            shares,
             planned(self.tables, shares),
             unwanted(self.program, self.tables, shares),
             thrifty=not self.objective.timeless,

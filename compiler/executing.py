@@ -31,11 +31,12 @@ Shares = Callable[[str, float, Mapping[str, Known]], Share]  # call, seconds lef
 class Execution:
     """One run of a program in progress.
 
-    planned: for each call, seconds from the start until its share ends. unwanted: calls that are
-    not run. thrifty: whether the last call keeps to its share too. decide: in place of the plan,
-    the share of a call when it is about to start. memory: of modules between runs, by call.
-    parts: what has been run, by label. granted: seconds that were decided for calls when they
-    began. watches: of calls that were watched while they ran.
+    shares: seconds of each call. planned: seconds from the start until its share ends, if no other
+    arm has its processor first. unwanted: calls that are not run. thrifty: whether the last call
+    keeps to its share too. decide: in place of the plan, the share of a call when it is about to
+    start. memory: of modules between runs, by call. parts: what has been run, by label. granted:
+    seconds that were decided for calls when they began. watches: of calls that were watched while
+    they ran.
     """
 
     program: Program
@@ -43,6 +44,7 @@ class Execution:
     steps: Mapping[str, Steps]
     deadline: Deadline
     inputs: Mapping[str, Any]
+    shares: Mapping[str, float]
     planned: Mapping[str, float]
     unwanted: frozenset[str]
     thrifty: bool = False
@@ -58,6 +60,7 @@ class Execution:
     def __post_init__(self) -> None:
         self.started = self.deadline.clock.now()
         self._skipped = set(self.unwanted)
+        self._waits: dict[str, float] = {}  # seconds for which arms before it have its processor
         self._due = due(self.program)
         self._joins = [
             (node, only_for(self.program, node))
@@ -136,7 +139,7 @@ class Execution:
         rest = first.keys() | waiting
         hard = latest - _least(self.tables, first) - sum(waiting.values())
         hard = min(hard, self.started + self._due.get(call.label, np.inf))
-        ends = now + share.seconds if share else self.started + self.planned[call.label]
+        ends = now + share.seconds if share else self._planned_end(call)
         if not rest:
             ends = min(ends, latest) if share or self.thrifty else latest
             return latest, min(ends, self.started + self._due.get(call.label, np.inf)), None
@@ -150,6 +153,9 @@ class Execution:
         # A generator with a guard is held to its share by it, the others by their deadline.
         return hard, ends, held
 
+    def _planned_end(self, call: Call) -> float:
+        return self.started + self.planned[call.label] + self._waits.get(call.label, 0.0)
+
     def _at_once(self, group: str) -> list[tuple[str, Result]]:
         """The arms of a parallel, each processor one after the other those that it is given."""
         arms: dict[int, list[Call]] = {}
@@ -160,12 +166,14 @@ class Execution:
                     arms.setdefault(arm.index, []).append(call)
                     processors = arm.processors
         lists = list(arms.values())
-        spent = [sum(self._share(call) for call in calls) for calls in lists]
+        spent = [sum(self.shares.get(call.label, 0.0) for call in calls) for calls in lists]
         clock = self.deadline.clock
-        queues = [
-            [call for arm in block for call in lists[arm]]
-            for block in costs.assignment(spent, processors)
-        ]
+        queues: list[list[Call]] = []
+        for block in costs.assignment(spent, processors):
+            queues.append([call for arm in block for call in lists[arm]])
+            for place, arm in enumerate(block):
+                waits = sum(spent[before] for before in block[:place])
+                self._waits |= {call.label: waits for call in lists[arm]}
         if isinstance(clock, WorkClock):
             made: list[tuple[str, Result]] = []
             latest = clock.now()
@@ -193,9 +201,6 @@ class Execution:
             for other in calls
             if self._wanted(other) and _beside(self.tables[other.label], own)
         ]
-
-    def _share(self, call: Call) -> float:
-        return self.planned.get(call.label, 0.0)
 
     def _wanted(self, call: Call) -> bool:
         return call.label not in self.parts and call.label not in self._skipped

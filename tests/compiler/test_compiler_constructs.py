@@ -107,7 +107,7 @@ def at_once(light):
 
 
 def shared_processor(light):
-    return join(*compiler.parallel(day(light), smooth(night(light)), processors=1))
+    return join(*compiler.parallel(smooth(night(light)), day(light), processors=1))
 
 
 def two(light):
@@ -218,7 +218,9 @@ def test_each_arm_of_a_parallel_has_its_share_at_every_budget(schedules, functio
     for seconds in schedule.frontier.budgets.tolist():
         shares, found = schedule.allocate(seconds).shares, run(schedule, seconds, DAY)
         assert found
-        assert all(found.parts[label].elapsed <= share + 1e-9 for label, share in shares.items())
+        for label, part in found.parts.items():
+            assert part.elapsed <= shares[label] + 1e-9
+            assert part.elapsed >= shares[label] - 0.01 or part.status is Status.COMPLETE
 
 
 def test_promises_of_few_problems_are_unsure_whatever_the_program_is_made_of(schedules):
