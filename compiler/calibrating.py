@@ -183,7 +183,9 @@ def as_tables_say(
         return [value_of(again, moments_within(again, row), objective) for row in shares]
 
     said = frontier.promised[knots]
-    if objective == EXPECTED and len(problems) > 1:
+    if objective == EXPECTED and len(problems) == 1:
+        low, high = mean_interval(said[None])
+    elif objective == EXPECTED:
         groups = np.array_split(rng.permutation(problems), min(len(problems), RESAMPLES))
         without = [said_of({p: float(p not in group) for p in problems}) for group in groups]
         values = len(groups) * said - (len(groups) - 1) * np.array(without)

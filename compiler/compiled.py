@@ -87,7 +87,7 @@ class CompiledProgram:
         exact, else the value of a policy that sees what every call achieves; 1 where even that
         is out of reach."""
         if self.frontier.exact:
-            return self.promise(_finite(seconds))
+            return self.promise(seconds)
         bound = ceiling(self.program, self.tables, _finite(seconds), self.objective)
         return max(self.promise(seconds), 1.0 if bound is None else self.calibration.promise(bound))
 

@@ -229,6 +229,14 @@ def test_promises_of_few_problems_are_unsure_whatever_the_program_is_made_of(sch
         assert high - low > 1.0 / len(SCENES)
 
 
+def test_one_problem_makes_nothing_sure():
+    library = anytime.measure(
+        compiler.program(at_once), SCENES[:1], seconds=1.0, clock=lambda: WorkClock(MACHINE)
+    )
+    low, high = compiler.compile(compiler.program(at_once), library).interval(1.0)
+    assert high - low > 0.5
+
+
 def test_what_returns_several_results_or_an_answer_is_no_module(schedules):
     with pytest.raises(AnytimeError, match="it returns several outputs"):
         _ = schedules[two].module
