@@ -22,6 +22,7 @@ from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
+from planners.landmarks import known_way
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.norms import expected_norm, least_norm
 from planners.path_finding import Cell
@@ -36,6 +37,7 @@ _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
 _REGION_PERCENT = 104  # weight of the search over regions between ends 128 cells apart …
 _PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
+_GUIDED_PERCENT = 102  # … and where landmarks tell it how far off the goal is
 _FIRST, _SCALES = 1.08, (1.015, 0.995)
 """By what the norm of independent obstacles is multiplied, search by search …"""
 _TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
@@ -105,6 +107,7 @@ class _Query:
         self.coarse = 0.0
         run.state[COUNT], run.state[MEETING] = 0, -1
         self._map = (grid.cost, grid.wall, columns)
+        self._soft = (grid.cost, grid.wall, grid.dearest, columns)
 
     def phases(self) -> Iterator[float]:
         """Work step by step; see `steps`."""
@@ -123,11 +126,14 @@ class _Query:
             if self.done:
                 return
         else:
-            yield from self.over_regions()
+            yield from self.over_known_regions()
+            if not self.done:
+                yield from self.over_regions()
             if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
                 yield from self.search(_FIRST, patience=_PATIENCE * far)
             if self.done:
                 return
+            yield from self.learn()
             left = _WINDOW_SHARE * self.coarse
             for length in _WINDOWS:
                 for work in self.windows(length):
@@ -197,21 +203,33 @@ class _Query:
         else:
             expected_norm(self.grid.features[0], scale, self.diagonals, self.run.norm)
 
+    def over_known_regions(self) -> Iterator[float]:
+        """A first way by what earlier queries have found out about distances, if they have."""
+        grid, run = self.grid, self.run
+        count, cost, work = known_way(
+            *self._soft, self.start, self.goal, self.diagonals, grid.regions,
+            grid.landmarks.tables, run.path,
+        )  # fmt: skip
+        if count:
+            run.state[COUNT], self.cost = count, int(cost)
+            yield work / blocks.EXPANDED
+
     def over_regions(self) -> Iterator[float]:
-        """A first way over the graph of regions."""
-        grid, run = self.grid, _borrow_regions(self.grid.shape)
-        cost, wall, columns = self._map
-        soft = (cost, wall, grid.dearest, columns)
+        """A first way over the graph of regions, or a better one."""
+        grid, run, soft = self.grid, _borrow_regions(self.grid.shape), self._soft
+        distances = grid.landmarks.tables.far
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
+        if len(distances):
+            percent = _GUIDED_PERCENT
         try:
             work = region_search.begin_regions(
-                *soft, self.start, self.goal, percent, grid.regions, run
+                *soft, self.start, self.goal, percent, grid.regions, run, distances
             )
             found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
                 found, taken = region_search.search_regions(
-                    *soft, self.goal, self.diagonals, percent, grid.regions, run,
+                    *soft, self.goal, self.diagonals, percent, grid.regions, run, distances,
                     _FIRST_GRAIN * blocks.EXPANDED // 2,
                 )  # fmt: skip
                 work += taken
@@ -220,19 +238,29 @@ class _Query:
                     yield work / blocks.EXPANDED
                     work = 0
             if found == NO_PATH:
-                if wall == 0:
+                if grid.wall == 0:
                     self.least = math.inf
                 yield work / blocks.EXPANDED
                 return
             pins, way, touched = tracing.pins_of(
-                columns, self.goal, self.diagonals, grid.regions, run
+                soft[-1], self.goal, self.diagonals, grid.regions, run
             )
         finally:
             _region_runs[grid.shape].append(run)
-        count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, self.run.path)
-        self.run.state[COUNT] = count
-        self._weigh()
+        path, state = self.run.path, self.run.state
+        before = path[: state[COUNT]].copy()
+        count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, path)
+        cost = int(way_cost(*self._map, path, 0, count - 1))
+        if cost < self.cost:
+            state[COUNT], self.cost = count, cost
+        else:
+            path[: len(before)] = before
         yield (work + (touched + more) * blocks.TOUCHED) / blocks.EXPANDED
+
+    def learn(self) -> Iterator[float]:
+        """Find out about distances for later queries."""
+        for work in self.grid.landmarks.grow(self._soft, self.start, self.grid.regions):
+            yield work / blocks.EXPANDED
 
     def windows(self, length: int) -> Iterator[float]:
         """Make the way optimal in windows of that many cells, one after the other."""

@@ -146,11 +146,13 @@ def part(cost, wall, dearest, columns, block, regions):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def region_of(columns, node, regions):
-    """The region of a passable cell whose block is known, or -1."""
+    """The region of a passable cell, or -1, as where its block is not known."""
     across = (columns + SIDE - 1) // SIDE
     row, column = node // columns, node % columns
     block = row // SIDE * across + column // SIDE
     bit = ONE << np.uint64(row % SIDE * SIDE + column % SIDE)
+    if regions.count[block] == UNKNOWN:
+        return -1
     for number in range(np.int64(regions.count[block])):
         region = number * regions.count.size + block
         if regions.mask[region] & bit != ZERO:

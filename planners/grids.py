@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from planners.blocks import SIDE, Regions, forget, new_regions
+from planners.landmarks import Landmarks
 from planners.map_features import features
 from planners.path_finding import Cell, flat_free, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "36bb0186bf2b"
+CALLED = "872315106e79"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much
@@ -82,6 +83,11 @@ class Grid:
         return new_regions(*self.shape)
 
     @cached_property
+    def landmarks(self) -> Landmarks:
+        """What later queries have found out about distances so far."""
+        return Landmarks(*self.shape)
+
+    @cached_property
     def features(self) -> tuple[float, float, int]:
         """(density of what is blocked, its clustering, cells looked at): see `map_features`."""
         return features(self.cost, self.wall, self.dearest, self.shape[1], _SAMPLE)
@@ -112,6 +118,7 @@ class Grid:
             height, width
         )
         forget(self.regions, columns, top, left, top + height, left + width)
+        self.__dict__.pop("landmarks", None)
 
     def __repr__(self) -> str:
         seen = int((self.regions.count != 255).sum())

@@ -14,10 +14,14 @@ from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region
 from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "a415f4ba60f0"
+CALLED = "0f1b7dacfcab"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
+MARKS, UNIT = 8, 8
+"""Landmarks of a map; their distances are in units of 1 << 8."""
+_LEAN, _SLACK = 97, 4 * STRAIGHT
+"""Per cent of a difference of distances that is relied upon, beyond the size of regions."""
 OPENED, LAST_REGION, SHIFT, CURRENT, LOW, HIGH, FRESH, UNUSED = range(8)
 """State of a search over regions: entries in all buckets; the goal's region; width of a bucket, as
 a shift; the bucket at work, the lowest and the highest used; the first entry never used, the first
@@ -65,7 +69,18 @@ def new_region_run(rows: int, columns: int) -> RegionRun:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, run):
+def likely_way(far, region, other):
+    """How long the way between two regions is at least likely to be, by landmarks."""
+    most = np.int64(0)
+    for mark in range(MARKS):
+        one, two = np.int64(far[region, mark]), np.int64(far[other, mark])
+        if one > 0 and two > 0:
+            most = max(most, abs(one - two))
+    return (most << UNIT) * _LEAN // 100 - _SLACK
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, run, far):
     """Begin a search from start to goal; return the work, in 1/256 expansions."""
     rows, across = cost.size // columns, (columns + SIDE - 1) // SIDE
     state, work = run.state, 0
@@ -80,9 +95,14 @@ def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, r
     state[OPENED], state[LAST_REGION], state[LOW], state[HIGH] = 0, last, 0, -1
     if first < 0 or last < 0:
         return work
-    # All that is open at once must fit into the ring of buckets: f falls on the way to the goal by
-    # what the weight adds, and rises with one step by at most two blocks each way and back.
-    spread = (percent - 100) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
+    h = least_way(start // columns - goal // columns, start % columns - goal % columns, True)
+    # All that is open at once should fit into the ring of buckets: f falls on the way to the goal
+    # by what the weight adds, rises by what landmarks leave to be desired, and with one step by at
+    # most two blocks each way and back.
+    spread = max(percent - 100, 0) * (rows + columns) * DIAGONAL // 100 + 16 * SIDE * DIAGONAL
+    if far.shape[0] > 0:
+        h = max(h, likely_way(far, first, last))
+        spread += (100 - _LEAN) * h // 100
     state[SHIFT] = FINE
     while spread >> state[SHIFT] >= BUCKETS:
         state[SHIFT] += 1
@@ -91,7 +111,6 @@ def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, r
     run.parent[first] = -1
     run.door[first] = 0
     run.bend[first] = start
-    h = least_way(start // columns - goal // columns, start % columns - goal % columns, True)
     state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
     state[CURRENT] = state[LOW] = state[HIGH] = (h * percent // 100) >> state[SHIFT]
     run.entry[0], run.behind[0] = first, NOTHING
@@ -133,7 +152,9 @@ def _in_sight(cells, first, line, ahead, along, to_ahead, to_along):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regions, run, budget):
+def search_regions(
+    cost, wall, dearest, columns, goal, diagonals, percent, regions, run, far, budget
+):
     """Go on with the search; return (FOUND or NO_PATH or OUT_OF_BUDGET, work in 1/256 expansions).
 
     Weighted A*. A region is entered by one cell, its pin: of the cells that join it to the region
@@ -152,6 +173,7 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
     goal_row, goal_column = goal // columns, goal % columns
     per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
     waves = np.empty(SIDE * SIDE + 1, np.uint64)
+    guided = far.shape[0] > 0
     while opened > 0:
         if work >= budget:
             found = OUT_OF_BUDGET
@@ -255,6 +277,8 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                             least, along = g + h, first + place
                     h = least_way(line - goal_ahead, along - goal_along, diagonals)
                     g, from_cell = least - h, np.int64(NOTHING)
+                if guided:
+                    h = max(h, likely_way(far, region, last))
                 f = g + h * percent // 100
                 if known and f >= cheapest[region]:
                     continue
@@ -269,7 +293,7 @@ def search_regions(cost, wall, dearest, columns, goal, diagonals, percent, regio
                 else:
                     place = fresh
                     fresh += 1
-                number = f >> shift
+                number = min(max(f >> shift, high - BUCKETS + 1), current + BUCKETS - 1)
                 entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
                 bucket[number & (BUCKETS - 1)] = place
                 opened += 1

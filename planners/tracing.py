@@ -10,10 +10,10 @@ from numba import njit
 
 from planners.blocks import FIRST_COLUMN, FIRST_ROW, LAST_BIT, LAST_ROW, SIDE, ZERO
 from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost, wave
-from planners.region_search import LAST_REGION
+from planners.region_search import LAST_REGION, NEAREST
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "d1ca47a35794"
+CALLED = "7f66b0283864"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -23,23 +23,61 @@ TAUT = 2
 def pins_of(columns, goal, diagonals, regions, run):
     """The cells over which the regions found lead: the start, each region's pin, the goal.
 
-    The search chose pins when it did not know yet where they lead; here each is drawn taut between
-    its neighbours, `TAUT` times. Returns (pins, the regions that they
-    enter, cells touched).
+    Returns (pins, the regions that they enter, cells touched).
     """
     count, region = 2, run.state[LAST_REGION]
     while run.parent[region] >= 0:
         count += 1
         region = run.parent[region]
     pins, way = np.empty(count, np.int32), np.empty(count - 1, np.int64)
+    bends = np.empty(count, np.int32)
     pins[count - 1] = goal
     region = run.state[LAST_REGION]
     for place in range(count - 2, -1, -1):
-        pins[place] = run.pin[region]
+        pins[place], bends[place] = run.pin[region], run.bend[region]
         way[place] = region
         region = run.parent[region]
+    return pins, way, _draw_taut(columns, pins, bends, way, diagonals, regions)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def pins_along(columns, start, goal, diagonals, regions, way):
+    """The same for a way over regions of which nothing more is known.
+
+    Returns (pins, cells touched).
+    """
+    across, blocks, pins = (columns + SIDE - 1) // SIDE, regions.count.size, np.empty(0, np.int32)
+    pins = np.empty(way.size + 1, np.int32)
+    pins[0], pins[way.size] = start, goal
+    for place in range(1, way.size):
+        # Straight ahead from the pin before, or as near to it as the border is open.
+        here, behind = way[place], way[place - 1]
+        block, before = here % blocks, np.int64(pins[place - 1])
+        top = block // across * SIDE
+        left = (block - top // SIDE * across) * SIDE
+        side = block - behind % blocks
+        side = 0 if side == across else 1 if side == -across else 2 if side == 1 else 3
+        mine, other = np.int64(regions.edge[here]), np.int64(regions.edge[behind])
+        join = (mine >> (SIDE * side)) & (other >> (SIDE * (side ^ 1))) & 0xFF
+        if side < 2:
+            along = np.int64(NEAREST[join, min(max(before % columns - left, 0), SIDE - 1)])
+            pins[place] = (top + (side & 1) * (SIDE - 1)) * columns + left + along
+        else:
+            along = np.int64(NEAREST[join, min(max(before // columns - top, 0), SIDE - 1)])
+            pins[place] = (top + along) * columns + left + (side & 1) * (SIDE - 1)
+    return pins, way.size + _draw_taut(columns, pins, pins, way, diagonals, regions)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _draw_taut(columns, pins, bends, way, diagonals, regions):
+    """Draw each pin taut between its neighbours, `TAUT` times; return the cells touched.
+
+    They were chosen when it was not known yet where they lead. At first the way to each is that
+    from where it bends last, which may lie several regions back.
+    """
     across, blocks, touched = (columns + SIDE - 1) // SIDE, regions.count.size, 0
-    masks, bends, entered = regions.mask, run.bend, run.pin
+    masks, count = regions.mask, pins.size
+    drawn = np.full(count, -1, np.int32)
     coming, going = np.empty(SIDE * SIDE + 1, np.uint64), np.empty(SIDE * SIDE + 1, np.uint64)
     for turn in range(TAUT):
         for step in range(1, count - 1):
@@ -47,9 +85,11 @@ def pins_of(columns, goal, diagonals, regions, run):
             here, behind = way[place], way[place - 1]
             block, other_block = here % blocks, behind % blocks
             side = other_block - block
-            # At first from where the way bends, which may lie several regions back.
-            bent = turn > 0 or bends[here] == entered[here]
-            before = np.int64(pins[place - 1] if bent else bends[here])
+            bent = turn > 0 or bends[place] == pins[place]
+            before = np.int64(pins[place - 1] if bent else bends[place])
+            if before == drawn[place]:  # neither neighbour has moved since
+                continue
+            drawn[place] = before if bent else -1
             after = np.int64(pins[place + 1])
             before_row, after_row = before // columns, after // columns
             before_column, after_column = before - before_row * columns, after - after_row * columns
@@ -99,7 +139,7 @@ def pins_of(columns, goal, diagonals, regions, run):
                 if there < least:
                     least = there
                     pins[place] = row * columns + column
-    return pins, way, touched
+    return touched
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

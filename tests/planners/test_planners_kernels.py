@@ -9,7 +9,16 @@ import pytest
 import planners
 
 FOLDER = Path(planners.__file__).parent
-CALLEES = {"search", "frontier", "windows", "blocks", "region_search", "refining", "improving"}
+CALLEES = {
+    "search",
+    "frontier",
+    "windows",
+    "blocks",
+    "region_search",
+    "refining",
+    "improving",
+    "tracing",
+}
 CALLEES |= {"query.header", "query.choosing", "query.varying"}
 IMPORT = re.compile(r"^from planners\.([a-z_.]+) import", re.MULTILINE)
 STATED = re.compile(r'^CALLED = "(\w*)"', re.MULTILINE)
