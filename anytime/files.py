@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import os
+import stat
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,7 +43,7 @@ class Disk:
         os.fsync(file)
 
     def rename(self, old: str, new: Path) -> None:
-        Path(old).chmod(0o644)
+        Path(old).chmod(stat.S_IMODE(new.stat().st_mode) if new.exists() else 0o644)
         Path(old).replace(new)
 
     def remove(self, path: str) -> None:
@@ -60,8 +61,15 @@ def write_atomically(path: Path, content: bytes, disk: Disk = DISK) -> None:
     """Write a file so that a crash leaves the old one or the new one, never a mixture.
 
     When this returns the new one is on the disk; when it raises OSError the old one stands, unless
-    the folder alone could not be synchronised.
+    the folder alone could not be synchronised. What a link leads to is written, and what is no
+    file (a pipe, a device) is written to. Raises AnytimeError for a folder.
     """
+    path = Path(os.path.realpath(path))
+    if path.is_dir():
+        raise AnytimeError(f"{path} is a folder; give the name of a file")
+    if path.exists() and not path.is_file():
+        path.write_bytes(content)
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     sweep(path.parent)
     file, temporary = disk.create(path.parent, f".{path.name}.{os.getpid()}.")

@@ -82,7 +82,8 @@ def perform(
     try:
         address = naming.address(current.module.function)
         job = _job(current, address, inputs, filled, None if real else current.deadline.clock.now())
-        while (worker := workers.take(address, until)) is not None:
+        interrupted = current.deadline.interrupted
+        while (worker := workers.take(address, until, interrupted)) is not None:
             run = _Isolated(current, worker, may_step)
             try:
                 complete, fault = run.live(job, until) if real else run.live_told(job, until)
@@ -96,6 +97,8 @@ def perform(
         return False, Fault.of(error)
     finally:
         current.close()
+    if interrupted():
+        return False, None
     return False, Fault("TimeoutError", workers.missing())
 
 
@@ -142,7 +145,12 @@ class _Isolated:
                     break
                 if time.perf_counter() > deadline.at + _DRAIN:
                     break
-                self._adopt(letter.content)
+                try:
+                    self._adopt(letter.content)
+                except Exception as error:  # a value that cannot be read, or who looks on failed
+                    fault = Fault.of(error)
+                    self._stop()
+                    break
                 if letter.kind == POST and not self.may_step(self.run):
                     self._stop()
                     break
@@ -191,7 +199,7 @@ class _Isolated:
                         continue
                     go = self.may_step(run) if run.module.generator else not deadline.expired()
                     go = go and not deadline.interrupted()
-                except AnytimeError as error:
+                except Exception as error:
                     go, fault = False, Fault.of(error)
                 now = struct.pack("<d", deadline.clock.now())
                 worker.mailbox.send(GO if go else STOP, now, until=time.perf_counter() + HUNG)

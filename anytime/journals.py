@@ -42,9 +42,12 @@ def opened(path: Path, of: Stored, kind: type[Line]) -> Generator[Journal[Line]]
         content = file.read()
         whole = content[: content.rfind(b"\n") + 1]
         kept = _read(path, whole, of, kind)
+        header = msgspec.json.encode(of) + b"\n"
+        if not whole and not header.startswith(content):
+            raise AnytimeError(f"{path}: not one of our files; give one that is not there yet")
         file.truncate(len(whole))
         if not whole:
-            file.write(msgspec.json.encode(of) + b"\n")
+            file.write(header)
             file.flush()
         yield Journal(file, kept)
 

@@ -164,13 +164,11 @@ def _store(profile: Profile) -> _Profile:
             call=run.call,
             inputs=dict(run.inputs),
             features=dict(run.features),
-            seconds=[round(float(s), 9) for s in run.seconds],
+            seconds=run.seconds.tolist(),
             work=run.work.tolist(),
-            raw=[float(f"{q:.9g}") for q in run.raw],
-            estimates=None
-            if np.isnan(run.estimates).any()
-            else [float(f"{e:.9g}") for e in run.estimates],
-            end=(round(run.end[0], 9), run.end[1]),
+            raw=run.raw.tolist(),
+            estimates=None if np.isnan(run.estimates).any() else run.estimates.tolist(),
+            end=run.end,
             complete=run.complete,
         )
         for run in sorted(
@@ -213,8 +211,8 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     if min(run.end) < 0:
         raise refuse("the end of a run cannot be negative")
     if profile.references:
-        if profile.references.get(run.problem, 0.0) <= 0:
-            raise refuse(f"no positive reference cost for its problem {run.problem!r}")
+        if profile.references.get(run.problem, -1.0) < 0:
+            raise refuse(f"no reference cost for its problem {run.problem!r}")
         if any(cost < 0 for cost in run.raw):
             raise refuse("a cost is negative; costs are >= 0")
     elif any(not 0 <= quality <= 1 for quality in run.raw):

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext
-from dataclasses import replace
+from contextlib import nullcontext, suppress
+from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from anytime import executors
 from anytime.campaigns import lived
 from anytime.clocks import Clock, WallClock, WorkClock, is_number
+from anytime.digests import digest_of
 from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine, Rate, charged_rate, processor, stepped_rate
 from anytime.modules import Module
 from anytime.outcomes import Campaign, Outcome, Pace, opened
 from anytime.profiles import Profile
-from anytime.programs import Program, program_of, upstream
+from anytime.programs import Constant, Program, program_of, upstream
 from anytime.sampling import How, sampled
 
 FIRST_LOOK = 20  # problems after which it is first asked whether they are enough
@@ -83,9 +81,9 @@ def measure(
         raise AnytimeError(
             f"clock={clock!r}; give what makes a run's clock, like `lambda: WorkClock(machine)`"
         )
-    keys = problem_keys(program, listed)
+    keys = problem_keys(program, listed, told_apart=store is not None)
     named = dict(zip(keys, listed, strict=True))
-    how = How(seconds, clock, rest, seed)
+    how = How(float(seconds), clock, float(rest), int(seed))
     made = clock()
     known = made.machine if isinstance(made, WorkClock) else None
     if executor is None and store is None and until is None:
@@ -188,10 +186,18 @@ class _Watch:
 
 def _described(program: Program, how: How) -> Campaign:
     made = how.clock()
-    clock = repr(made.machine) if isinstance(made, WorkClock) else type(made).__name__
-    return Campaign(
-        program=repr(program), seconds=how.seconds, rest=how.rest, seed=how.seed, clock=clock
-    )
+    clock = type(made).__name__
+    if isinstance(made, WorkClock):  # in words, and to the last digit
+        machine = made.machine
+        clock = (
+            f"{machine!r}, {digest_of(sorted((n, astuple(r)) for n, r in machine.rates.items()))}"
+        )
+    written = program.written
+    constants = [a.value for c in program.calls for a in c.arguments if isinstance(a, Constant)]
+    if constants:
+        with suppress(TypeError):  # then what they are written as must do
+            written += f", {digest_of(*constants)}"
+    return Campaign(program=written, seconds=how.seconds, rest=how.rest, seed=how.seed, clock=clock)
 
 
 def _library(
@@ -226,8 +232,12 @@ def _rate(paces: Sequence[Pace]) -> Rate:
     return stepped_rate((int(step), took) for pace in paces for step, took in pace.pieces)
 
 
-def problem_keys(program: Program, problems: Sequence[Any]) -> list[str]:
-    """A key for each problem: its name, or a hash of its inputs; equal problems are numbered."""
+def problem_keys(program: Program, problems: Sequence[Any], told_apart: bool = False) -> list[str]:
+    """A key for each problem: its name, or a digest of its attributes; equal ones are numbered.
+
+    Raises AnytimeError for a problem without an input, and, if they must be `told_apart` wherever
+    they are made, for one that has no name and cannot be pickled.
+    """
     keys: dict[str, None] = {}
     for place, problem in enumerate(problems):
         missing = [name for name in program.inputs if not hasattr(problem, name)]
@@ -236,23 +246,23 @@ def problem_keys(program: Program, problems: Sequence[Any]) -> list[str]:
                 f"problems[{place}] has no .{missing[0]}; the inputs of {program.name} are "
                 f"{', '.join(program.inputs)}"
             )
-        name = getattr(problem, "name", None)
-        key = name if isinstance(name, str) else _digest(program, problem)
+        key = getattr(problem, "name", None)
+        if not isinstance(key, str):
+            try:
+                key = _digest(program, problem)
+            except TypeError as error:
+                if told_apart:
+                    raise AnytimeError(
+                        f"problems[{place}] has no name, and {error}; give it a .name by which a "
+                        "store knows it again"
+                    ) from None
+                key = type(problem).__name__
         numbered = (f"{key}#{count}" for count in itertools.count(2))
         keys[key if key not in keys else next(k for k in numbered if k not in keys)] = None
     return list(keys)
 
 
 def _digest(program: Program, problem: Any) -> str:
-    digest = hashlib.blake2b(digest_size=8)
-    for name in program.inputs:
-        value = getattr(problem, name)
-        try:
-            array = np.asarray(value)
-            plain = array.dtype != object
-        except (ValueError, TypeError):
-            plain = False
-        digest.update(
-            np.ascontiguousarray(array).tobytes() if plain else type(value).__name__.encode()
-        )
-    return digest.hexdigest()
+    others = {k: v for k, v in getattr(problem, "__dict__", {}).items() if k not in program.inputs}
+    inputs = [getattr(problem, name) for name in program.inputs]
+    return digest_of(*inputs, *(part for name in sorted(others) for part in (name, others[name])))

@@ -95,14 +95,27 @@ class Module:
             )
         return function(result, problem) if _takes_two(function) else function(result)
 
-    def __call__(self, *arguments: object) -> Any:
+    def __call__(self, *arguments: object, **named: object) -> Any:
         caller = calling.current.get()
         if caller is None:
             raise AnytimeError(
                 f"{self.name} is a module: use anytime.run({self.name}, …, seconds=…), "
                 "or call it in a function decorated with @compiler.program"
             )
-        return caller.call(self, arguments)
+        return caller.call(self, self._in_order(arguments, named))
+
+    def _in_order(
+        self, arguments: tuple[object, ...], named: dict[str, object]
+    ) -> tuple[object, ...]:
+        """Arguments given by position and by name, in the order of the parameters."""
+        rest = self.parameters[len(arguments) :]
+        if named.keys() - set(rest):
+            unknown = sorted(named.keys() - set(rest))
+            raise AnytimeError(
+                f"{self.name} is called with {unknown[0]}=…; by name it takes "
+                f"{', '.join(rest) or 'nothing more'}"
+            )
+        return (*arguments, *(named[name] for name in rest if name in named))
 
     def __reduce__(self) -> tuple[Callable[..., object], tuple[Any, ...]]:
         """Another process finds a module by its name, as it does a function, and sets it."""
@@ -164,7 +177,7 @@ def module(
             raise AnytimeError(
                 f"module {label!r} has too many settings; at most {MOST} are measured"
             )
-        is_generator = inspect.isgeneratorfunction(function)
+        is_generator = inspect.isgeneratorfunction(inspect.unwrap(function))
         if isolated and "memory" in filled:
             raise AnytimeError(
                 f"module {label!r} is isolated and has a memory; a worker may die at any time, so "

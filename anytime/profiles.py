@@ -43,7 +43,7 @@ class Recording:
     def __post_init__(self) -> None:
         # The same steps added in another order differ in the last bit, and are the same moment.
         object.__setattr__(self, "seconds", np.round(self.seconds, 12))
-        object.__setattr__(self, "end", (round(self.end[0], 12), self.end[1]))
+        object.__setattr__(self, "end", (round(float(self.end[0]), 12), float(self.end[1])))
 
 
 @dataclass(frozen=True)
@@ -232,7 +232,8 @@ class Profile:
         return replace(self, condition={**self.condition, **condition})
 
     def at(self, seconds: float) -> Distribution:
-        """The distribution of quality after `seconds`."""
+        """The distribution of quality after `seconds`. Raises AnytimeError for NaN."""
+        _no_nan(seconds)
         return Distribution(self.quality_at(seconds)[:, 0], self.weights)
 
     def mean(self, seconds: ArrayLike, *, as_measured: bool = False) -> Floats:
@@ -241,8 +242,7 @@ class Profile:
         The monotone envelope (the best expectation with that time or less), or as measured.
         """
         times = np.atleast_1d(np.asarray(seconds, dtype=float))
-        if np.isnan(times).any():
-            raise AnytimeError("seconds holds NaN; give times")
+        _no_nan(times)
         changes, measured = self._course
         known = measured if as_measured else np.maximum.accumulate(measured)
         return known[np.searchsorted(changes, times, side="right")]
@@ -263,11 +263,20 @@ class Profile:
         return self.at(seconds).quantile(share)
 
     def time_to(self, quality: float, share: float = 0.5) -> float:
-        """Seconds until a share of the runs has reached this quality; inf if it never does."""
-        reached = np.nan_to_num(self.quality_at(self.times), nan=-1.0) >= quality
-        reached = np.maximum.accumulate(reached, axis=1)
-        hits = np.flatnonzero(self.weights @ reached >= share - 1e-12)
-        return float(self.times[hits[0]]) if len(hits) else float("inf")
+        """Seconds until a share of the runs has reached this quality; inf if it never does.
+
+        Raises AnytimeError for a share outside (0, 1].
+        """
+        if not 0 < share <= 1:
+            raise AnytimeError(f"a share of {share} of the runs; give one in (0, 1]")
+        arrived: list[float] = []
+        for run, values in zip(self.recordings, self.qualities, strict=True):
+            # Of results at one moment the last stands.
+            stands = np.append(np.diff(run.seconds) > 0, True)[: len(values)]
+            arrived.append(min(run.seconds[stands & (values >= quality)], default=np.inf))
+        order = np.argsort(arrived, kind="stable")
+        hits = np.flatnonzero(np.cumsum(self.weights[order]) >= share - 1e-12)
+        return float(arrived[order[hits[0]]]) if len(hits) else float("inf")
 
     def progress(self, quality: float, seconds: float) -> Distribution:
         """Where a run that has this quality now will be in `seconds` [Hansen & Zilberstein 2001].
@@ -392,3 +401,8 @@ class Profile:
             series, bands=bands, x_label="time [s]", y_label="expected quality", title=self.module
         )
         return figure(svg, repr(self))
+
+
+def _no_nan(seconds: ArrayLike) -> None:
+    if np.isnan(np.asarray(seconds, dtype=float)).any():
+        raise AnytimeError("seconds holds NaN; give times")

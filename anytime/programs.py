@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
+
+import numpy as np
+from numpy.typing import NDArray
 
 from anytime import calling
 from anytime.errors import AnytimeError
 from anytime.joins import Best, Rule
 from anytime.modules import Module
+from anytime.pictures import clipped
 
 
 class Reading:
@@ -45,6 +49,13 @@ class Reading:
             raise AnytimeError(
                 f"two different modules are named {module.name!r}; give one @anytime.module(name=…)"
             )
+        for argument in arguments:
+            hidden = None if isinstance(argument, _Symbol) else _symbol_in(argument)
+            if hidden is not None:
+                raise AnytimeError(
+                    f"program {self.program!r} calls {module.name} with {hidden!r} inside a "
+                    f"{type(argument).__name__}; give it as an argument of its own"
+                )
         nodes = tuple(a if isinstance(a, _Symbol) else Constant(a) for a in arguments)
         label = self._label(module.name)
         made = Call(module, nodes, label)  # pyright: ignore[reportArgumentType]
@@ -122,7 +133,15 @@ class _Symbol:
     __floordiv__ = __rfloordiv__ = __mod__ = __rmod__ = __pow__ = __rpow__ = __add__
     __matmul__ = __rmatmul__ = __neg__ = __pos__ = __abs__ = __add__
     __lt__ = __gt__ = __le__ = __ge__ = __add__  # pyright: ignore
-    __len__ = __contains__ = __float__ = __int__ = __add__
+    __len__ = __contains__ = __float__ = __int__ = __index__ = __complex__ = __add__
+    __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = __invert__ = __add__
+    __lshift__ = __rlshift__ = __rshift__ = __rrshift__ = __divmod__ = __rdivmod__ = __add__
+    __round__ = __trunc__ = __floor__ = __ceil__ = __array__ = __add__
+
+    def __str__(self) -> str:
+        if isinstance(calling.current.get(), Reading):
+            self._refuse("writes out", "do it inside a module")
+        return repr(self)
 
     def __eq__(self, other: object) -> bool:
         if self is not other and isinstance(calling.current.get(), Reading):
@@ -213,9 +232,13 @@ class Program:
             "library), then schedule.run(seconds=…, …), or call the schedule in another program"
         )
 
+    @property
+    def written(self) -> str:
+        """The program in one line, whole."""
+        return f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"
+
     def __repr__(self) -> str:
-        text = f"program {self.name}({', '.join(self.inputs)}) = {self.output!r}"
-        return text if len(text) <= 100 else f"{text[:99]}…"
+        return clipped(self.written)
 
     def call(self, label: str) -> Call:
         """The call with this label. Raises AnytimeError naming the labels there are."""
@@ -226,6 +249,25 @@ class Program:
             f"program {self.name!r} has no call {label!r}; "
             f"it has {', '.join(call.label for call in self.calls)}"
         )
+
+
+def _symbol_in(value: Any, depth: int = 4) -> _Symbol | None:
+    """A symbol that a constant holds, where lists, tuples, sets, dicts and arrays lead to it."""
+    if isinstance(value, _Symbol):
+        return value
+    if depth == 0:
+        return None
+    inner: Iterable[Any] = ()
+    if isinstance(value, dict):
+        content = cast("dict[Any, Any]", value)
+        inner = [*content, *content.values()]
+    elif isinstance(value, list | tuple | set | frozenset):
+        inner = cast("Iterable[Any]", value)
+    elif isinstance(value, np.ndarray):
+        array = cast("NDArray[Any]", value)
+        inner = array.ravel().tolist() if array.dtype == object else ()
+    found = (_symbol_in(each, depth - 1) for each in inner)
+    return next((symbol for symbol in found if symbol is not None), None)
 
 
 def upstream(call: Call) -> dict[str, Call | Join]:

@@ -37,7 +37,11 @@ class Fault:
 
     @classmethod
     def of(cls, error: BaseException) -> Fault:
-        return cls(type(error).__name__, str(error), "".join(traceback.format_exception(error)))
+        try:
+            message = str(error)
+        except Exception as broken:  # its own __str__ raises
+            message = f"an error that cannot say what it is: {type(broken).__name__}"
+        return cls(type(error).__name__, message, "".join(traceback.format_exception(error)))
 
     def __str__(self) -> str:
         return f"{self.kind}: {self.message}" if self.message else self.kind

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
@@ -61,7 +62,7 @@ class Run:
             )
         self.mixed = self.mixed or (self._steps > 0 and not self.charges)
         self.charges = True
-        self.work += work
+        self.work += float(work)
         self.deadline.clock.spend(self.module.name, work, None)
 
     def check(self) -> None:
@@ -335,7 +336,11 @@ def _generate(
                 current.record(value)
         return False
     finally:
-        steps.close()
+        token = calling.current.set(current)
+        try:
+            steps.close()
+        finally:
+            calling.current.reset(token)
 
 
 def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool:
@@ -344,6 +349,11 @@ def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool
         value = current.module.function(*inputs, **filled)
     finally:
         calling.current.reset(token)
+    if inspect.isgenerator(value):
+        raise AnytimeError(
+            f"module {current.module.name!r} returned a generator, which its decorator does not "
+            "show; put @anytime.module next to the function that yields"
+        )
     if value is not None:
         current.check()
         current.record(value)

@@ -82,13 +82,13 @@ def sampled(program: Program, key: str, problem: Any, how: How) -> Outcome:
 
 
 def _references(program: Program, samples: Mapping[str, list[_Sample]]) -> dict[str, float]:
-    """The cheapest known result of each module with a cost; where every cost is 0, or nothing
-    arrived, any reference will do."""
+    """The cheapest known result of each module with a cost; where nothing arrived, any reference
+    will do."""
     best: dict[str, float] = {}
     for call in program.calls:
         if call.module.quality is not None:
             continue
-        costs = [float(cost) for run in samples[call.label] for cost in run.raw if cost > 0]
+        costs = [float(cost) for run in samples[call.label] for cost in run.raw]
         # Settings of one module are compared with each other, so they share the reference.
         family = family_of(call.module.name)
         best[family] = min([*costs, best.get(family, math.inf)])
@@ -159,8 +159,14 @@ def _sample(
     if len(kept) > CHANGES:
         chosen = np.unique(np.linspace(0, len(kept) - 1, CHANGES).round().astype(int))
         kept = [kept[i] for i in chosen]
-    raw = np.array([_scored(module, value, problem, key) for value, _ in kept])
+    raw = np.array([scored(module, value, problem, key) for value, _ in kept])
     features = {**(module.features(*inputs) if module.features else {}), **told}
+    for name, value in features.items():
+        if not math.isfinite(value):
+            raise AnytimeError(
+                f"feature {name!r} of {module.name!r} is {value} on problem {key}; features must "
+                "be finite numbers"
+            )
     values, changes = tuple(value for value, _ in kept), tuple(change for _, change in kept)
     return _Sample(module, values, changes, raw, fed, result, run, features)
 
@@ -196,7 +202,8 @@ def _in_order(results: Iterable[tuple[Any, Change]]) -> list[tuple[Any, Change]]
     return kept
 
 
-def _scored(module: Module, value: Any, problem: Any, key: str) -> float:
+def scored(module: Module, value: Any, problem: Any, key: str) -> float:
+    """The score of a result. Raises AnytimeError for one that is none."""
     try:
         score = float(module.score(value, problem))
     except AnytimeError:

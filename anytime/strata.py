@@ -51,6 +51,11 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
     diagonal, and a module that is as good as its worst input is not taken for one as good as
     their mean.
     """
+    # Equal points are one corner, and share its weight.
+    equal = (np.abs(points[:, :, None, :] - points[:, None, :, :]) < SAME).all(axis=3)
+    equal &= there[:, :, None] & there[:, None, :]
+    first = equal.argmax(axis=2)
+    every, there = there, there & (first == np.arange(points.shape[1]))
     count = len(points)
     away = points - target[:, None, :]
     off = away - away.mean(axis=2, keepdims=True)
@@ -72,7 +77,8 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
         best[better] = cost[better]
     weights = np.zeros(there.shape)
     weights[rows[:, None], near] = found
-    return weights
+    shared = np.take_along_axis(weights, first, axis=1) / np.maximum(equal.sum(axis=2), 1)
+    return np.where(every, shared, 0.0)
 
 
 def _barycentric(away: Floats) -> tuple[Floats, Mask]:

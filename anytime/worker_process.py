@@ -166,7 +166,7 @@ def main(descriptor: int, known: list[tuple[str, str, str]]) -> None:
     isolation.become_worker()
     idle = _address_space()
     for address in known:
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception, SystemExit):
             naming.found(*address)
     gc.collect()
     gc.freeze()

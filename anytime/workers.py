@@ -11,12 +11,14 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 from anytime import naming
 from anytime.mail import ClosedError, Letter, Mailbox
 from anytime.worker_letters import DONE, GRACE, READY
 
 KEPT = 2  # processes: one to work and one that is warm
+STILLBORNS = 4  # workers that die before they are ready, after which no more are tried for a run
 _LOOK = 0.002  # seconds between two looks at who is ready
 
 
@@ -92,15 +94,23 @@ class Workers:
         self._dying: list[Worker] = []
         self._known: list[naming.Address] = []
         self._lock = threading.Lock()
-        self._stillborn = ""  # how the last one died that was never ready
+        self._stillborn = ""  # how the last one died that was never ready …
+        self._stillborns = 0  # … and how many did
 
-    def take(self, module: naming.Address, until: float) -> Worker | None:
-        """A worker that is ready, until a time of `time.perf_counter`; None if none became so,
-        see `missing`. Whoever takes one gives it back or ends it.
+    def take(
+        self,
+        module: naming.Address,
+        until: float,
+        interrupted: Callable[[], bool] = lambda: False,
+    ) -> Worker | None:
+        """A worker that is ready, until a time of `time.perf_counter` or an interruption; None if
+        none became so, see `missing`, or if one after the other dies. Whoever takes one gives it
+        back or ends it.
         """
         with self._lock:
             self._learn(module)
-        while True:
+            before = self._stillborns
+        while not interrupted() and self._stillborns - before < STILLBORNS:
             with self._lock:
                 worker = self._ready(module)
                 if worker is not None:
@@ -110,8 +120,9 @@ class Workers:
                 return worker
             left = until - time.perf_counter()
             if left <= 0:
-                return None
+                break
             time.sleep(min(left, _LOOK))
+        return None
 
     def missing(self) -> str:
         """Why `take` may have found none."""
@@ -160,6 +171,7 @@ class Workers:
             if hung or worker.process.poll() is not None:
                 if not worker.ready:
                     self._stillborn = worker.died()
+                    self._stillborns += 1
                 self._kept.remove(worker)
                 self._bury(worker)
         idle = [worker for worker in self._kept if worker.idle]

@@ -195,7 +195,7 @@ class CompiledProgram:
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
         allocation = self.allocate(budget)
         execution = self._execution(allocation.shares, deadline, inputs, rng, on_result)
-        execution.memory = memory or {}
+        execution.memory = {} if memory is None else memory
         plan = self._plan(budget)
         if self.policy is not None and plan is not None:
             execution.decide = partial(self.policy.share, self.program, plan)

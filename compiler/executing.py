@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -23,7 +23,7 @@ from compiler.tables import Table
 from compiler.watching import Watch
 
 Listener = Callable[[str, Any, Change], None]
-Memory = Mapping[str, dict[str, Any]]  # what modules keep between runs, by call
+Memory = MutableMapping[str, dict[str, Any]]  # what modules keep between runs, by call
 Shares = Callable[[str, float, Mapping[str, Known]], Share]  # call, seconds left, what is known
 
 
@@ -115,7 +115,9 @@ class Execution:
             tuple(argument.value for argument in found if argument is not None),
             own,
             rng=self.rng,
-            memory=self.memory.get(call.label),
+            memory=self.memory.setdefault(call.label, {})
+            if "memory" in call.module.filled
+            else None,
             may_step=lambda run: not self.interrupted() and may_step(run),
             observe=observe,
         )

@@ -13,6 +13,9 @@ from anytime.programs import Call, Constant, Input, Join, Program, reading
 from anytime.structure import behind, groups, in_order
 from compiler.constructs import Output, several
 
+_TAKEN = {"self", "seconds", "deadline", "clock", "rng", "on_result", "memory"}
+"""What `CompiledProgram.run` takes besides the inputs."""
+
 
 def program(function: Callable[..., Any]) -> Program:
     """Read a function that calls modules into a program.
@@ -23,6 +26,8 @@ def program(function: Callable[..., Any]) -> Program:
     Raises AnytimeError, with the place in the source, for what cannot be compiled.
     """
     where = _where(function)
+    if not isinstance(function, Module) and not inspect.isroutine(function):
+        raise AnytimeError(f"program takes a function that calls modules, not {function!r}")
     if isinstance(function, Module):
         raise AnytimeError(
             f"{function.name} is a module; a program is a plain function that calls modules"
@@ -31,6 +36,15 @@ def program(function: Callable[..., Any]) -> Program:
     for parameter in parameters:
         if parameter.kind is not parameter.POSITIONAL_OR_KEYWORD:
             raise AnytimeError(f"{where}: give {parameter.name!r} as an ordinary parameter")
+        if parameter.default is not parameter.empty:
+            raise AnytimeError(
+                f"{where}: {parameter.name!r} has a default; every input is given when it runs"
+            )
+        if parameter.name in _TAKEN:
+            raise AnytimeError(
+                f"{where}: the input {parameter.name!r} has the name of something that running a "
+                "program takes; give it another"
+            )
     names = tuple(parameter.name for parameter in parameters)
     try:
         with reading(function.__name__) as opened:

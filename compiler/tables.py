@@ -124,8 +124,11 @@ def table_of(join: Join, made: Mapping[str, Table], output: bool) -> Table:
         ]
         cells += [(cell, chance, quality) for chance, quality in join.rule.outcome(known)]
     there = np.array([[np.nan if quality is None else quality for *_, quality in cells]])
-    # The value of several results is their sum: coarse levels would spoil it.
+    # What a join passes on keeps its levels: combinations are not as likely as each other, so that
+    # quantiles of them would make one level of all that comes of an alternative seldom needed. The
+    # value of several results is their sum: coarse levels would spoil it.
     most = (64 if output and isinstance(join.rule, Several) else 2) * LEVELS
+    most = max(most, sum(shape))
     levels, bins = levels_of(there, most)
     chances = np.zeros((*shape, 1, len(levels)))
     for (cell, chance, _), level in zip(cells, bins[0], strict=True):

@@ -16,6 +16,7 @@ from anytime.pictures import clipped, duration, figure, line_chart, number
 from anytime.programs import Call, Input, Program, upstream
 from anytime.results import Change, Result
 from anytime.running import seed_of
+from anytime.sampling import scored
 from compiler.intervals import mean_interval
 from compiler.sufficiency import Finding, Lives, findings
 
@@ -177,7 +178,7 @@ def lived(
             for call in program.calls:
                 if call.label in values:
                     value = values[call.label]
-                    raw[call.label][row, column] = call.module.score(value, problem)
+                    raw[call.label][row, column] = scored(call.module, value, problem, str(column))
                     spent[call.label][row, column] = parts[call.label].elapsed
             if row == len(budgets) - 1:  # the best inputs that there are
                 for call in program.calls:

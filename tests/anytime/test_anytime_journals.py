@@ -53,3 +53,12 @@ def test_a_journal_of_something_else_is_refused(tmp_path):
     path.write_text('{"seed": 0}\n{"words": 3}\n')
     with pytest.raises(AnytimeError, match=r"file:2: not one of our runs"):
         written(path, [])
+
+
+@pytest.mark.parametrize("content", ['{"precious": [1, 2]}', "words without a line's end"])
+def test_a_file_of_somebody_else_is_refused_and_left_as_it_is(tmp_path, content):
+    path = tmp_path / "file"
+    path.write_text(content)
+    with pytest.raises(AnytimeError, match="not one of our files"):
+        written(path, ["one"])
+    assert path.read_text() == content

@@ -8,12 +8,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import anytime
 from anytime import AnytimeError, Machine, Profile, ProfileLibrary
 from anytime.files import checksum, write_atomically
 from anytime.library import read_machine, read_profile, write_machine
@@ -258,8 +260,8 @@ def run0(**values):
         (run0(raw=["a", "b", "c"]), "Expected `float`"),
         (run0(raw=[None, 0.2, 0.3]), "Expected `float`"),
         (run0(complete="yes"), "Expected `bool`"),
-        (edited(lambda c: c.update(references={"p0": 1.0})), "no positive reference"),
-        (edited(lambda c: c.update(references={f"p{i}": -1.0 for i in range(3)})), "no positive"),
+        (edited(lambda c: c.update(references={"p0": 1.0})), "no reference cost"),
+        (edited(lambda c: c.update(references={f"p{i}": -1.0 for i in range(3)})), "no reference"),
     ],
 )
 def test_a_file_that_lies_is_refused_with_the_reason(written, tmp_path, change, says):
@@ -405,3 +407,45 @@ def test_a_folder_that_mixes_machines_keeps_its_doubt():
     there = ProfileLibrary(profiles={"find": small()}, machine=Machine("this", {}, "there"))
     assert there.updated(here).machine.host == "there"
     assert ProfileLibrary().updated(here).machine.host == "here"
+
+
+def test_a_library_that_is_read_again_answers_as_before(tmp_path):
+    @anytime.module(quality=lambda value: value, name="third")
+    def third(x):
+        for step in range(1, 5):
+            yield x * step / 4
+
+    machine = anytime.Machine("m").with_rate("third", 1 / 300)
+    library = anytime.measure(
+        third,
+        [SimpleNamespace(x=x / 30) for x in range(1, 21)],
+        seconds=1.0,
+        clock=lambda: anytime.WorkClock(machine),
+    )
+    library.save(tmp_path)
+    again = anytime.ProfileLibrary(tmp_path)
+    same_as = {run.problem: run for run in again["third"].recordings}
+    for run in library["third"].recordings:
+        same = same_as[run.problem]
+        assert (run.seconds == same.seconds).all()
+        assert (run.raw == same.raw).all()
+    moments = np.arange(1, 5) / 300
+    assert library["third"].mean(moments) == pytest.approx(again["third"].mean(moments))
+
+
+def test_writing_goes_through_links_and_into_pipes_and_keeps_who_may_read(tmp_path):
+    real, link, pipe = tmp_path / "real", tmp_path / "link", tmp_path / "pipe"
+    real.write_bytes(b"old")
+    real.chmod(0o600)
+    link.symlink_to(real)
+    write_atomically(link, b"new")
+    assert link.is_symlink()
+    assert real.read_bytes() == b"new"
+    assert real.stat().st_mode & 0o777 == 0o600
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_atomically(pipe, b"told")
+    assert os.read(reader, 10) == b"told"
+    os.close(reader)
+    with pytest.raises(AnytimeError, match="is a folder; give the name of a file"):
+        write_atomically(tmp_path, b"new")

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import anytime
 import compiler
 from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock
+from anytime.measuring import problem_keys
 from anytime.sampling import CHANGES, COMBINATIONS, STRATA, _design
 
 MACHINE = Machine("m")
@@ -414,3 +415,111 @@ def test_of_many_results_those_at_equal_distances_are_kept_and_the_last():
     assert len(run.work) == CHANGES
     assert apart.max() <= 3 * apart.min()
     assert run.work[[0, -1]].tolist() == [1.0, 1500.0]
+
+
+class Scene:
+    """What an input may be: an object of the user's."""
+
+    def __init__(self, quality):
+        self.quality = quality
+
+
+@anytime.module(quality=lambda value, problem: value)
+def look(scene):
+    yield scene.quality
+
+
+@pytest.mark.parametrize(
+    "problems",
+    [
+        (SimpleNamespace(scene=Scene(0.1)), SimpleNamespace(scene=Scene(0.9))),
+        (
+            SimpleNamespace(scene=Scene(0.5), truth=0.1),
+            SimpleNamespace(scene=Scene(0.5), truth=0.2),
+        ),
+    ],
+    ids=["other objects", "another truth"],
+)
+def test_a_store_tells_problems_apart_by_all_that_they_hold(problems):
+    keys = {problem_keys(anytime.programs.program_of(look), [problem])[0] for problem in problems}
+    assert len(keys) == 2
+
+
+def test_arrays_of_other_shapes_are_other_problems():
+    program = anytime.programs.program_of(look)
+    shapes = [(2, 8), (4, 4), (16,)]
+    listed = [SimpleNamespace(scene=np.zeros(shape)) for shape in shapes]
+    listed.append(SimpleNamespace(scene=np.zeros(32, np.float32)))
+    assert len({problem_keys(program, [problem])[0] for problem in listed}) == 4
+
+
+def test_a_store_refuses_problems_that_it_could_not_know_again(tmp_path):
+    problem = SimpleNamespace(scene=Scene(0.5), hook=lambda: None)
+    assert anytime.measure(look, [problem], seconds=1)["look"].mean(1.0)[0] == 0.5
+    with pytest.raises(AnytimeError, match=r"problems\[0\] has no name, and .* give it a \.name"):
+        anytime.measure(look, [problem], seconds=1, store=tmp_path / "s.runs")
+
+
+def test_a_store_of_other_rates_or_of_another_constant_is_refused(tmp_path):
+    @anytime.module(quality=lambda value, problem: min(1.0, value))
+    def climb(x, start):
+        yield start
+        yield start + 0.1
+
+    def measured_with(middle, start):
+        program = compiler.program(lambda x: climb(x, start))
+        rate = anytime.machines.Rate(0.0, (0.01, middle, 0.01), 1.0, 3)
+        machine = Machine("s", {"climb": rate})
+        return anytime.measure(
+            program,
+            [SimpleNamespace(x=1, name="p")],
+            seconds=1,
+            clock=lambda: WorkClock(machine),
+            store=tmp_path / "s.runs",
+        )
+
+    measured_with(0.01, 0.1)
+    measured_with(0.01, 0.1)
+    for middle, start in ((0.0100004, 0.1), (0.01, 0.2)):
+        with pytest.raises(AnytimeError, match="start anew"):
+            measured_with(middle, start)
+
+
+def test_a_cost_of_nothing_is_the_cheapest_there_is():
+    @anytime.module(cost=lambda value, problem: value)
+    def errors(x):
+        for count in (5.0, 1.0, 0.0):
+            anytime.charge(1)
+            yield count
+
+    machine = Machine("m").with_rate("errors", 0.01)
+    library = anytime.measure(
+        errors, [SimpleNamespace(x=1)], seconds=1, clock=lambda: WorkClock(machine)
+    )
+    assert library["errors"].mean([0.01, 0.02, 0.03]).tolist() == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_feature_that_is_no_number_is_refused_with_the_problem(value):
+    @anytime.module(quality=lambda v, p: v, features=lambda x: {"size": value})
+    def sized(x):
+        yield x
+
+    with pytest.raises(AnytimeError, match=r"feature 'size' of 'sized' is .* on problem"):
+        anytime.measure(sized, [SimpleNamespace(x=0.5)], seconds=1)
+
+
+def test_numbers_of_numpy_are_measured_stored_and_saved(tmp_path):
+    @anytime.module(quality=lambda v, p: np.float32(v))
+    def counted(x):
+        anytime.charge(np.ones(5, bool).sum())
+        yield x
+
+    library = anytime.measure(
+        counted,
+        [SimpleNamespace(x=0.5)],
+        seconds=np.float64(1),
+        seed=np.int64(3),
+        store=tmp_path / "s.runs",
+    )
+    library.save(tmp_path / "library")

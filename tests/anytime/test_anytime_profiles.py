@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from dataclasses import replace
 
@@ -452,3 +453,42 @@ def test_a_machine_twice_as_fast_gives_the_same_quality_in_half_the_time(profile
     middles = (work[:-1] + work[1:]) / 2 if len(work) > 1 else work
     assert slow.mean(2 * rate * middles) == pytest.approx(fast.mean(rate * middles))
     assert replace(slow, machine="x", recordings=fast.recordings) == replace(fast, machine="x")
+
+
+def run_of(value, **inputs):
+    return Recording(
+        "p", "m", inputs, {}, np.array([0.1]), np.array([1.0]), np.array([value]),
+        np.array([np.nan]), (0.2, 1.0), True,
+    )  # fmt: skip
+
+
+def test_of_several_inputs_too_runs_on_equal_inputs_count_alike():
+    runs = (run_of(0.1, a=1.0, b=1.0), run_of(0.9, a=1.0, b=1.0), run_of(0.3, a=0.5, b=0.5))
+    for order in itertools.permutations(runs):
+        profile = Profile("m", ("a", "b"), order)
+        assert profile.given(a=1.0, b=1.0).mean(0.1)[0] == pytest.approx(0.5)
+        assert profile.given(a=0.5, b=0.5).mean(0.1)[0] == pytest.approx(0.3)
+        assert profile.given(a=0.75, b=0.75).mean(0.1)[0] == pytest.approx(0.4)
+
+
+@given(profiles(), st.floats(0.01, 1), st.floats(0.01, 1))
+def test_the_time_to_a_quality_is_the_first_at_which_a_share_of_the_runs_has_had_it(
+    profile, quality, share
+):
+    found = profile.time_to(quality, share)
+    moments = np.unique(np.concatenate([run.seconds for run in profile.recordings]))
+    reached = np.maximum.accumulate(
+        np.nan_to_num(profile.quality_at(moments), nan=-1.0) >= quality, axis=1
+    )
+    hits = moments[profile.weights @ reached >= share - 1e-9]
+    assert found == (hits[0] if len(hits) else np.inf)
+
+
+def test_questions_about_no_time_or_no_share_of_the_runs_are_refused():
+    profile = Profile("m", (), (run_of(0.5),))
+    for ask in (profile.at, profile.mean, lambda time: profile.quantile(0.5, time)):
+        with pytest.raises(AnytimeError, match="seconds holds NaN"):
+            ask(float("nan"))
+    for share in (0.0, -1.0, 5.0):
+        with pytest.raises(AnytimeError, match=r"a share of .* of the runs; give one in"):
+            profile.time_to(0.5, share)

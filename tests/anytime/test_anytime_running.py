@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 
 import numpy as np
@@ -548,3 +549,62 @@ def test_an_event_that_has_come_already_means_that_nothing_is_run():
 
     result = anytime.run(never, deadline=Deadline(WorkClock(Machine("m")), event=lambda: True))
     assert (result.status, result.fault) == (Status.NO_RESULT, None)
+
+
+def test_a_generator_behind_a_wrapper_is_run_as_one():
+    def traced(function):
+        @functools.wraps(function)
+        def wrapper(*inputs):
+            return function(*inputs)
+
+        return wrapper
+
+    @anytime.module(name="search")
+    @traced
+    def wrapped(steps):
+        yield from range(1, steps)
+
+    assert on_work_clock(wrapped, 9, seconds=3.0).value == 3
+
+
+def test_a_generator_that_is_returned_is_a_fault_and_no_result():
+    @anytime.module(name="search")
+    def returning():
+        return (value for value in range(3))
+
+    result = on_work_clock(returning, seconds=3.0)
+    assert result.status is Status.NO_RESULT
+    assert "returned a generator" in str(result.fault)
+
+
+def test_what_a_generator_registers_while_it_is_closed_is_its_own():
+    @anytime.module(name="search")
+    def inner():
+        try:
+            yield "inner"
+            yield "more"
+        finally:
+            with contextlib.suppress(AnytimeError):
+                anytime.register("cleaning up")
+
+    @anytime.module()
+    def outer():
+        yield "outer"
+        anytime.run(inner, seconds=1.5)
+
+    assert on_work_clock(outer, seconds=9.0).value == "outer"
+
+
+def test_an_error_that_cannot_say_what_it_is_is_a_fault_all_the_same():
+    class BrokenError(Exception):
+        def __str__(self):
+            return self.missing
+
+    @anytime.module(name="search")
+    def breaks():
+        yield "good"
+        raise BrokenError
+
+    result = on_work_clock(breaks, seconds=9.0)
+    assert result.value == "good"
+    assert result.fault.kind == "BrokenError"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -628,3 +629,25 @@ def test_any_content_with_a_fitting_checksum_is_valid_or_refused(saved, tmp_path
         assert max(map(len, repr(loaded).splitlines())) <= 100
         assert 0 <= loaded.promise(0.2) <= 1
         repr(run(loaded, 0.2))
+
+
+def test_what_modules_keep_is_kept_in_what_was_given_for_it():
+    @anytime.module(quality=lambda value, problem: value, name="keeping")
+    def keeping(x, *, memory):
+        memory["runs"] = memory.get("runs", 0) + 1
+        anytime.charge(1)
+        yield x * memory["runs"] / 10
+
+    machine = Machine("m").with_rate("keeping", 0.01)
+    library = anytime.measure(
+        keeping,
+        [SimpleNamespace(x=1.0), SimpleNamespace(x=0.5)],
+        seconds=1.0,
+        clock=lambda: WorkClock(machine),
+    )
+    compiled, kept = compiler.compile(keeping, library), {}
+    values = [
+        compiled.run(0.1, clock=WorkClock(machine), memory=kept, x=1.0).value for _ in range(3)
+    ]
+    assert values == [0.1, 0.2, 0.3]
+    assert kept == {"keeping": {"runs": 3}}

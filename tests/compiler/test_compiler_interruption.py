@@ -378,7 +378,7 @@ def lucky(hard, *, seconds, rng):
 
 
 def test_luck_is_tried_again_until_it_is_not_worth_it():
-    library = anytime.measure(lucky, problems(60), seconds=1.0, clock=clock)
+    library = anytime.measure(lucky, problems(240), seconds=1.0, clock=clock)
     when = stats.uniform(0, 0.4)
     ends = when.ppf((np.arange(200) + 0.5) / 200)
     achieved = {}

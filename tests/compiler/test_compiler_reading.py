@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+
+import numpy as np
 import pytest
 
 import anytime
@@ -261,3 +264,40 @@ def test_reading_that_failed_leaves_modules_as_they_were():
     with pytest.raises(AnytimeError):
         read(adds)
     assert anytime.run(see, "image", seconds=10).value == "image"
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        (lambda a, b: find([a], b), "calls find with a inside a list"),
+        (lambda a, b: find({"deep": [(a,)]}, b), "calls find with a inside a dict"),
+        (lambda a, b: find(f"{a}.png", b), "writes out a"),
+        (lambda a, b: find(str(a), b), "writes out a"),
+        (lambda a, b: find(np.asarray(a), b), "computes with a"),
+        (lambda a, b: find(a & b, b), "computes with a"),
+        (lambda a, b: find(~a, b), "computes with a"),
+        (lambda a, b: find(round(a), b), "computes with a"),
+        (lambda a, b: find([1, 2][a], b), "computes with a"),
+        (lambda a, b: find(a, goals=b), "find is called with goals=…; by name it takes goal"),
+        (lambda a, b=2: find(a, b), "'b' has a default"),
+        (lambda a, clock: find(a, clock), "the input 'clock' has the name"),
+    ],
+)
+def test_what_hides_a_symbol_or_computes_with_it_is_refused_with_its_place(body, reason):
+    with pytest.raises(AnytimeError, match=re.escape(reason)) as caught:
+        compiler.program(body)
+    assert "test_compiler_reading.py" in str(caught.value)
+
+
+@pytest.mark.parametrize("what", [3, "words", Program])
+def test_only_a_function_is_read(what):
+    with pytest.raises(AnytimeError, match="program takes a function that calls modules, not"):
+        compiler.program(what)
+
+
+def test_inputs_may_be_given_by_name():
+    @compiler.program
+    def navigate(image, goal):
+        return find(goal=goal, boxes=see(image=image))
+
+    assert repr(navigate.output) == "find(see(image), goal)"

@@ -100,7 +100,7 @@ def test_the_simulated_profile_promises_what_independent_tosses_bring(profile):
 def test_one_problem_is_enough_to_begin_with():
     machine = Machine("m").with_rate("toss", 1.0)
     library = anytime.measure(
-        toss, [Coin(), Coin()][:1], seconds=8.0, clock=lambda: WorkClock(machine), seed=3
+        toss, [Coin(), Coin()][:1], seconds=8.0, clock=lambda: WorkClock(machine), seed=4
     )
     policy, simulated = retrying(toss, library["toss"], survival_of(stats.uniform(0, 20)))
     assert len(policy.lengths) >= 1

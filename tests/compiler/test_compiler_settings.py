@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -85,3 +86,23 @@ def test_a_program_with_knobs_is_loaded_with_the_modules_themselves(schedule, tm
     again = compiler.load(tmp_path / "both.schedule", modules=[solve, polish])
     assert again.allocate(0.05).shares == schedule.allocate(0.05).shares
     assert again.run(0.05, clock=clock(), hardness=0.4).value is not None
+
+
+@pytest.mark.parametrize("count", [4, 6, 8])
+def test_of_many_settings_each_has_its_budget(count):
+    qualities = np.linspace(0.4, 0.9, count)
+
+    @anytime.module(quality=lambda value, problem: value, name="many")
+    def many(x, *, k=anytime.knob(list(range(count)))):
+        anytime.charge(k + 1)
+        yield qualities[k] * x
+
+    machine = Machine("m").with_rate("many", 0.01)
+    xs = np.random.default_rng(0).uniform(0.7, 1.0, 40)
+    library = anytime.measure(
+        many, [SimpleNamespace(x=x) for x in xs], seconds=2.0, clock=lambda: WorkClock(machine)
+    )
+    compiled = compiler.compile(many, library)
+    for k, quality in enumerate(qualities):
+        budget = 0.01 * (k + 1) + 0.001
+        assert compiled.promise(budget) == pytest.approx(quality * xs.mean(), abs=0.02)
