@@ -58,6 +58,8 @@ class WorkClock:
     """
 
     def __init__(self, machine: Machine, start: float = 0.0) -> None:
+        if not isinstance(machine, Machine):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"a work clock of {machine!r}; give a Machine")
         self.machine = machine
         self._now = start
         self._beside: list[Callable[[float], None]] = []

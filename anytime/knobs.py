@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import numbers
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,9 +32,10 @@ def knob(values: Sequence[Any]) -> Any:
     found = tuple(values)
     names = [str(value) for value in found]
     for value, name in zip(found, names, strict=True):
-        if not isinstance(value, int | float | str) or not _WORD.fullmatch(name):
+        plain = isinstance(value, str | numbers.Real) and value == value  # NaN is not itself
+        if not plain or not _WORD.fullmatch(name):
             raise AnytimeError(f"a knob of {value!r}; its values are numbers or words")
-    if len(found) < 2 or len(set(names)) < len(names):
+    if len(found) < 2 or len(set(found)) < len(found) or len(set(names)) < len(names):
         raise AnytimeError(f"a knob of {list(found)}; give two different values or more")
     return Knob(found)
 

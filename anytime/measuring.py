@@ -77,6 +77,10 @@ def measure(
         raise AnytimeError(f"seconds={seconds!r}; give the time that each run may take, > 0")
     if not is_number(rest) or not 0 <= rest < math.inf:
         raise AnytimeError(f"rest={rest!r}; give the idle seconds before each run, >= 0")
+    if executor is not None and not isinstance(executor, str) and not hasattr(executor, "submit"):
+        raise AnytimeError(
+            f"executor={executor!r}; give {executors.SPECIFICATIONS}, or an Executor"
+        )
     if not callable(clock):
         raise AnytimeError(
             f"clock={clock!r}; give what makes a run's clock, like `lambda: WorkClock(machine)`"

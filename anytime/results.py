@@ -73,7 +73,9 @@ class Result:
         over = f" ({duration(self.overrun)} over)" if self.overrun >= 5e-7 else ""
         estimate = self.history[-1].estimate if self.history else None
         seen = "" if estimate is None else f" {number(estimate)}"
-        count = f"{len(self.history)} result{'s' if len(self.history) != 1 else ''}"
+        # What a choice passes on has no history of its own.
+        made = len(self.history) or sum(len(part.history) for part in self.parts.values())
+        count = f"{made} result{'s' if made != 1 else ''}"
         lines = [f"{self.status.name}{seen} after {duration(self.elapsed)}{over} · {count}"]
         lines += [f"  {label}: {part!r}".split("\n")[0] for label, part in self.parts.items()]
         if self.fault:

@@ -25,6 +25,8 @@ RESAMPLED = 8  # budgets at which intervals are found from the tables of some of
 RESAMPLES = 60  # of those tables, at most
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
 DIVIDED = 3  # calls at most of programs that are divided anew for each fold
+LATER = (1.25, 1.5, 2.0)  # times the greatest budget at which its division is tried as well …
+GAINED = 0.02  # … if that gains so much
 KNOTS = 96  # budgets at which promises are calibrated; fewer for many calls
 
 
@@ -86,6 +88,7 @@ def calibrate(
     with more of it, for tables, which are averages over problems, can be mistaken. Isotonic
     regression of the means over the tables' levels gives the promises.
     """
+    frontier = _with_more_time(frontier, replay)
     knots = _knots(frontier, KNOTS * DIVIDED // max(DIVIDED, len(program.calls)))
     values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
     standing = _standing(values)
@@ -126,6 +129,34 @@ def calibrate_by_running(
         promised=np.array(worth),
     )
     return calibration.applied(found), calibration
+
+
+def _with_more_time(frontier: Frontier, replay: Replay) -> Frontier:
+    """The frontier with its last division at greater budgets too, where that gains by them.
+
+    A step that is cheaper than those before it is taken for as dear, and is not begun where the
+    tables say that it just fits. Twice the time is enough for one that is no dearer.
+    """
+    last, budget = frontier.shares[-1], float(frontier.budgets[-1])
+
+    def divided(seconds: float) -> list[float]:
+        shares = stretched(replay.tables, last.tolist(), seconds)
+        return [shares.get(table.label, 0.0) for table in replay.tables]
+
+    def lived(seconds: float) -> float:
+        shares = stretched(replay.tables, last.tolist(), seconds)
+        return float(replay.achieved([*shares.values()], seconds).mean())
+
+    if lived(LATER[-1] * budget) <= lived(budget) + GAINED:
+        return frontier
+    # The tables say the same of all of them; promises are told apart by what differs.
+    levels = frontier.promised[-1] + 1e-12 * np.arange(1, len(LATER) + 1)
+    return replace(
+        frontier,
+        budgets=np.append(frontier.budgets, budget * np.array(LATER)),
+        shares=np.vstack([frontier.shares, *(divided(each * budget) for each in LATER)]),
+        promised=np.append(frontier.promised, levels),
+    )
 
 
 def _stretched(

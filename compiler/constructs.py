@@ -96,7 +96,7 @@ def loop(
                 "the last, and no times"
             )
         turns = len(chances) + 1
-    elif times is None or times < 1 or chances is not None:
+    elif not isinstance(times, int) or times < 1 or chances is not None:
         raise AnytimeError("loop takes times=…, 1 or more, or until=MODULE with chances=(…)")
     else:
         turns = times

@@ -34,6 +34,9 @@ def load(path: str | Path, modules: Sequence[Module]) -> CompiledProgram:
     Raises AnytimeError for a broken file, for a module that is missing or has other parameters.
     """
     file = Path(path)
+    for module in modules:
+        if not isinstance(module, Module):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"modules holds {module!r}; give the modules that the program calls")
     return _restore(file, read_record(file, SCHEMA, StoredSchedule), modules)
 
 

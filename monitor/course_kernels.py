@@ -20,6 +20,7 @@ def best_speed(
     stops: Floats,
     speeds: Floats,
     power: Floats,
+    idle: float,
     value: Floats,
     worth: Floats,
     tick: float,
@@ -29,8 +30,8 @@ def best_speed(
 
     now: in ticks. left: length to be walked in all. thinking: seconds that the frame's calls still
     take; contract: those of a frame. walked, changes, stops: [O] equally likely outcomes. power:
-    [V] price of a second at each speed. value: [T + 1] of completing at each tick. worth:
-    [T + 1, F] of frames that begin later.
+    [V] price of a second at each speed; idle: of one of standing. value: [T + 1] of completing at
+    each tick. worth: [T + 1, F] of frames that begin later.
     """
     last, rows = worth.shape[0] - 1, worth.shape[1]
     top, chosen = -np.inf, 0
@@ -45,7 +46,9 @@ def best_speed(
                     k = int(at)
                     total += value[k] + (at - k) * (value[k + 1] - value[k])
                 continue
-            at = now + max((max(thinking, drive) + stops[outcome] * contract) / tick, 1.0)
+            frame = max(thinking, drive) + stops[outcome] * contract
+            total -= idle * (frame - drive)
+            at = now + max(frame / tick, 1.0)
             if at >= last:
                 continue
             after = min((left - walked[outcome]) * changes[outcome] / cell, rows - 1.0)
@@ -71,6 +74,7 @@ def solve(
     contract: float,
     speeds: Floats,
     power: Floats,
+    idle: float,
     worth: Floats,
 ) -> None:
     """Fill worth, [T + 1, F], backwards in time; that of the last tick stays as it is.
@@ -94,6 +98,7 @@ def solve(
                 stops[row],
                 speeds,
                 power,
+                idle,
                 value,
                 worth,
                 tick,

@@ -23,7 +23,8 @@ NORMAL = np.array([-1.383, -0.674, -0.210, 0.210, 0.674, 1.383])  # equally like
 class CourseTable:
     """What it is worth to keep to a course, at the best speeds.
 
-    speeds: [V]. power: [V] price of a second at each. value: [T + 1] of completing at each tick.
+    speeds: [V]. power: [V] price of a second at each; idle: of one of standing. value: [T + 1] of
+    completing at each tick, the job at the goal paid.
     worth: [T + 1, F] net value to expect when a frame begins, what was used before apart.
     tick: seconds. cell: length to be walked from one column to the next.
     """
@@ -31,6 +32,7 @@ class CourseTable:
     course: Course
     speeds: Floats
     power: Floats
+    idle: float
     value: Floats
     worth: Floats
     tick: float
@@ -62,6 +64,7 @@ class CourseTable:
             made_on.stops[row],
             self.speeds,
             self.power,
+            self.idle,
             self.value,
             self.worth,
             self.tick,
@@ -89,7 +92,8 @@ def solve(mission: Mission, course: Course, route: float) -> CourseTable:
     speeds = np.geomspace(*mission.speeds, SPEEDS)
     unsure = float(course.walked.mean()) / (2.0 * float(np.sqrt(speeds[0] * speeds[-1])))
     times = np.arange(TICKS + 1)[:, None] * tick + mission.job + unsure * NORMAL
-    completing = value(np.maximum(times, 0.0)).mean(axis=1)
+    idle = mission.energy.price * mission.energy.idle
+    completing = value(np.maximum(times, 0.0)).mean(axis=1) - idle * mission.job
     power = mission.energy.price * mission.energy.power(speeds)
     worth = np.zeros((TICKS + 1, COLUMNS))
     cell = REACH * max(course.forecast.whole * route, 1.0) / (COLUMNS - 1)
@@ -104,6 +108,7 @@ def solve(mission: Mission, course: Course, route: float) -> CourseTable:
         course.contract,
         speeds,
         power,
+        idle,
         worth,
     )
-    return CourseTable(course, speeds, power, completing, worth, tick, cell)
+    return CourseTable(course, speeds, power, idle, completing, worth, tick, cell)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from anytime.programs import makers
 from compiler import CompiledProgram
-from compiler.baselines import maximal_shares, minimal_shares
 from compiler.division import expected_quality, moments_within
+from compiler.settings import settings_of
+from compiler.tables import Table
 from monitor.missions import Mission
 from monitor.rhythms import Rhythm
 from monitor.states import Decision, State, Why
@@ -57,14 +58,29 @@ def compiled_contracts(program: CompiledProgram) -> Contracts:
 
 def pinned_contracts(program: CompiledProgram, extreme: str) -> Contracts:
     """The same program with sensing pinned to its least ("min") or greatest ("max") useful time."""
-    shares_of = minimal_shares if extreme == "min" else maximal_shares
-    pinned = shares_of(program.tables, 0.0)[:-1]
-    last = program.tables[-1]
-    gained = last.expected.reshape(-1, len(last.times)).mean(axis=0)
-    useful = last.times[np.flatnonzero(np.diff(np.maximum.accumulate(gained), prepend=0.0) > 1e-9)]
-    count = min(CONTRACTS, len(useful))
-    chosen = useful[np.unique(np.linspace(0, len(useful) - 1, count).round().astype(int))]
-    return _contracts(program, np.array([[*pinned, seconds] for seconds in chosen]))
+    settings = settings_of(program.tables)
+    rows: list[Floats] = []
+    for tables in settings:
+        timed = [place for place, t in enumerate(tables) if t.rule is None and len(t.times) > 1]
+        pinned = np.zeros(len(tables))
+        for place in timed:
+            table = tables[place]
+            pinned[place] = table.first if extreme == "min" else table.saturation
+        useful = _useful(tables[timed[-1]])
+        count = min(max(CONTRACTS // len(settings), 1), len(useful))
+        for seconds in useful[
+            np.unique(np.linspace(0, len(useful) - 1, count).round().astype(int))
+        ]:
+            rows.append(pinned.copy())
+            rows[-1][timed[-1]] = seconds
+    return _contracts(program, np.array(rows))
+
+
+def _useful(table: Table) -> Floats:
+    """The moments of a call at which its quality rises."""
+    gained = table.expected.reshape(-1, len(table.times)).mean(axis=0)
+    rises = np.diff(np.maximum.accumulate(gained), prepend=0.0) > 1e-9
+    return table.times[np.flatnonzero(rises)]
 
 
 def _contracts(program: CompiledProgram, shares: Floats) -> Contracts:

@@ -18,6 +18,12 @@ from monitor.log_lines import DRAWN, SCHEMA, EndLine, FrameLine, Log, MissionLin
 from monitor.missions import Energy, News, Value
 
 
+class _Fixed(msgspec.Struct):
+    shares: dict[str, float]
+    speed: float
+    net: float | None = None
+
+
 def read_log(path: Path | str) -> Log:
     """Read a log; a torn last line, as a crash leaves it, is dropped.
 
@@ -50,6 +56,11 @@ def read_log(path: Path | str) -> Log:
                 )
             if not line.forks:
                 raise AnytimeError(f"{path}:{number}: a regret is made of one fork or more")
+            decided = frames[line.frame].moments[0].shares
+            if any(shares.keys() - decided for shares, _, _ in line.forks):
+                raise AnytimeError(
+                    f"{path}:{number}: a fork gives time to a call that its frame does not have"
+                )
             regrets.append(line)
         elif mission is None or end is not None or isinstance(line, MissionLine):
             raise AnytimeError(f"{path}:{number}: a log is one mission, its frames and one end")
@@ -96,6 +107,11 @@ def _check_mission(line: MissionLine, where: str) -> None:
         Energy(**line.energy)
     except (TypeError, ValueError) as error:
         raise AnytimeError(f"{where}: {error}") from None
+    if line.fixed is not None:
+        try:
+            msgspec.convert(line.fixed, _Fixed)
+        except msgspec.ValidationError as error:
+            raise AnytimeError(f"{where}: fixed: {error}") from None
     scene = line.scene
     if scene is not None:
         cells = scene.rows * scene.columns

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Protocol
 
+from anytime.clocks import is_number
 from anytime.errors import AnytimeError
 from monitor.inter_frame import Contracts, Spread, best_contract
 from monitor.intra_frame import keep_course
@@ -84,9 +85,9 @@ def constant(shares: dict[str, float], speed: float) -> Constant:
 
     Raises AnytimeError for a negative time or a speed that does not move.
     """
-    if not 0 < speed < math.inf:
-        raise AnytimeError(f"speed is {speed}; it must be a finite number > 0")
+    if not is_number(speed) or not 0 < speed < math.inf:
+        raise AnytimeError(f"speed is {speed!r}; it must be a finite number > 0")
     for label, seconds in shares.items():
-        if not 0 <= seconds < math.inf:
-            raise AnytimeError(f"{label} gets {seconds} s; it must be a finite number >= 0")
+        if not is_number(seconds) or not 0 <= seconds < math.inf:
+            raise AnytimeError(f"{label} gets {seconds!r} s; it must be a finite number >= 0")
     return Constant(Decision(shares, speed, Why(case="fixed")))

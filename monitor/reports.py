@@ -113,7 +113,7 @@ class Report:
         """
         if self.again is None:
             raise AnytimeError("this mission cannot be lived again; live it with a briefing")
-        if not 0 <= frame < len(self.frames):
+        if not isinstance(frame, int) or not 0 <= frame < len(self.frames):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise AnytimeError(
                 f"frame is {frame}; the mission had frames 0 to {len(self.frames) - 1}"
             )

@@ -27,6 +27,7 @@ class Stop:
 
 
 STOP = Stop()
+LEAST_WORTH = 0.1  # of the mean of the best utilities, that a run counts for in shares
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,9 @@ class Runs:
 
     def __post_init__(self) -> None:
         for name in ("seconds", "quality", "seen"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
+            kept = np.array(getattr(self, name), dtype=float)
+            kept.flags.writeable = False  # rules get parts of them
+            object.__setattr__(self, name, kept)
         if self.quality.ndim != 2 or self.quality.shape != self.seen.shape:
             raise AnytimeError("quality and seen must have the same shape, [runs, times]")
         if self.seconds.shape != self.quality.shape[1:] or self.quality.size == 0:
@@ -118,7 +121,8 @@ class Stopped:
     """How a rule did on runs, each [N].
 
     seconds: at which it stopped. looks: how often it looked. utility: what it got, looks paid.
-    loss: share of the best utility in hindsight that it missed.
+    loss: share of the best utility in hindsight that it missed, which counts as at least
+    `LEAST_WORTH` of its mean over the runs.
     """
 
     seconds: Floats
@@ -138,7 +142,9 @@ def stop_runs(rule: StoppingRule, runs: Runs, task: Task) -> Stopped:
     utilities = runs.utilities(task)
     best = utilities.max(axis=1)
     got = utilities[np.arange(len(runs)), at] - task.look * looks
-    loss = (best - got) / np.maximum(np.abs(best), 1e-12)
+    # Where next to nothing can be had, a share of it would outweigh all the other runs.
+    worth = np.maximum(np.abs(best), LEAST_WORTH * np.abs(best).mean())
+    loss = (best - got) / np.maximum(worth, 1e-12)
     return Stopped(runs.seconds[at], looks, got, loss)
 
 
@@ -202,14 +208,17 @@ def choose(
     learners: by name, the preferred first. Of rules that can hardly be told apart, the first is
     taken: the first that loses at most one standard error more than the best does (Breiman's rule;
     picking the very best of several would follow the noise of a few dozen runs).
-    Raises AnytimeError for less runs than folds.
+    Raises AnytimeError for less runs than folds, and for a learner that is called "fixed".
     """
+    if "fixed" in learners:
+        raise AnytimeError("'fixed' is the fixed contract, which is always there; rename the rule")
     divided = parts(len(runs), folds, rng.permutation(len(runs)))
     every = {**learners, "fixed": fixed_contract}
     losses = {name: held_out(runs, task, learner, divided) for name, learner in every.items()}
     best = min(losses.values(), key=lambda loss: float(loss.mean()))
-    lead = next(name for name in every if errors_apart(losses[name], best) <= 1.0)
-    name = lead if errors_apart(losses["fixed"], losses[lead]) >= 1.0 else "fixed"
+    good = (name for name in learners if errors_apart(losses[name], best) <= 1.0)
+    better = (name for name in good if errors_apart(losses["fixed"], losses[name]) >= 1.0)
+    name = next(better, "fixed")
     return Choice(name, every[name](runs, task), losses)
 
 

@@ -48,7 +48,7 @@ class Grid:
                 "the domain is bool, it must be probabilities of being blocked; "
                 "`Grid.known(free)` takes a map of free cells"
             )
-        domain = np.ascontiguousarray(domain, np.float32)
+        domain = _floats(domain)
         if domain.ndim != 2 or not domain.size:
             raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [rows, columns]")
         cost = np.empty(domain.size, np.uint8)
@@ -99,13 +99,16 @@ class Grid:
         probabilities, or if the map is `known` and a cell neither blocked nor free.
         """
         rows, columns = self.shape
+        domain = _floats(domain)
+        if domain.ndim != 2:
+            raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [height, width]")
         height, width = domain.shape
         if not (0 <= top <= top + height <= rows and 0 <= left <= left + width <= columns):
             raise AnytimeError(
                 f"cells ({top}, {left}) to ({top + height - 1}, {left + width - 1}) are not all on "
                 f"the map of {rows} rows and {columns} columns"
             )
-        patch = np.ascontiguousarray(domain, np.float32).reshape(-1)
+        patch = domain.reshape(-1)
         cost = np.empty(patch.size, np.uint8)
         if not _cost(patch, cost):
             raise AnytimeError("the domain holds a number outside [0, 1]: give probabilities")
@@ -126,6 +129,15 @@ class Grid:
             f"<Grid {self.shape[0]} x {self.shape[1]} cells, {seen} of {self.regions.count.size} "
             f"blocks of {SIDE} x {SIDE} looked at>"
         )
+
+
+def _floats(domain: object) -> NDArray[np.float32]:
+    try:
+        return np.ascontiguousarray(domain, np.float32)
+    except (TypeError, ValueError):
+        raise AnytimeError(
+            f"the domain is a {type(domain).__name__}; give probabilities, [rows, columns]"
+        ) from None
 
 
 def endpoints(grid: Grid, start: Cell, goal: Cell, connectivity: int) -> tuple[int, int, bool]:

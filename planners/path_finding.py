@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.clocks import is_number
 from anytime.errors import AnytimeError
 from planners.frontier import cells_of, path_to, way_cost
 from planners.search import NO_PATH, UNLIMITED, WALL, Workspace, bucket_search, workspace
@@ -144,8 +145,8 @@ def _soft(
     weight: float,
     connectivity: int,
 ) -> Path | None:
-    if not 1.0 <= weight <= 100.0:
-        raise AnytimeError(f"weight is {weight:g}, it must be between 1 and 100")
+    if not is_number(weight) or not 1.0 <= weight <= 100.0:
+        raise AnytimeError(f"weight is {weight!r}, it must be between 1 and 100")
     work, diagonals, percent = workspace(grid.size), connectivity == 8, round(100 * weight)
     row, column = divmod(last, columns)
     target, box = (row, column, row + 1, column + 1), (0, 0, grid.size // columns, columns)

@@ -79,10 +79,6 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
             "1.0 → 2.0",
         ): _BELOW,
         (
-            "reached = np.nan_to_num(self.quality_at(self.times), nan=-1.0) >= quality",
-            "1.0 → 2.0",
-        ): _BELOW,
-        (
             "quality = np.where(run.raw > 0, reference / run.raw, 1.0)",
             "1.0 → 2.0",
         ): "a quality above 1 is cut to 1",
@@ -110,12 +106,7 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
     },
     "monitor.inter_frame": {
         (
-            "pinned = shares_of(program.tables, 0.0)[:-1]",
-            "0.0 → 1.0",
-        ): "what is left goes to the last call, which is left out here",
-        (
-            "useful = last.times[np.flatnonzero(np.diff(np.maximum.accumulate(gained), "
-            "prepend=0.0) > 1e-9)]",
+            "rises = np.diff(np.maximum.accumulate(gained), prepend=0.0) > 1e-9",
             "Gt → GtE",
         ): _TIE,
         (
@@ -125,11 +116,12 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
     },
     "monitor.stopping": {
         (
-            "lead = next(name for name in every if errors_apart(losses[name], best) <= 1.0)",
+            "good = (name for name in learners if errors_apart(losses[name], best) <= 1.0)",
             "LtE → Lt",
         ): _TIE,
         (
-            'name = lead if errors_apart(losses["fixed"], losses[lead]) >= 1.0 else "fixed"',
+            'better = (name for name in good if errors_apart(losses["fixed"], losses[name]) '
+            ">= 1.0)",
             "GtE → Gt",
         ): _TIE,
     },

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from anytime import ProfileLibrary
+from anytime import Machine, ProfileLibrary
 from anytime.errors import AnytimeError
 from compiler import CompiledProgram, load
 from monitor.policies import Expected
@@ -32,7 +32,8 @@ def compare(
 
     before, after: folders of profiles, or files that `anytime compile` wrote. tolerance: the loss
     of net value that is put up with. memory: where what the missions lived teach is kept.
-    Raises AnytimeError for two of different kinds, and for programs of other modules.
+    Raises AnytimeError for a path that is not there, for two of different kinds, and for programs
+    of other modules.
     """
     grid = replace(grid, mission=grid.mission.known(0.0))  # judged as it is presented
     for path in (before, after):
@@ -46,10 +47,22 @@ def compare(
     if before.is_dir():
         libraries = ProfileLibrary(before), ProfileLibrary(after)
         shifts = shifts_of_libraries(navigate, *libraries)  # refuses before anything is lived
+        grid = replace(grid, machine=as_before(grid.machine, libraries[0].machine))
         return gate(foreseen(brief(grid, libraries[0], effort(grid), memory)), shifts, tolerance)
     old, new = (_schedule(path, grid) for path in (before, after))
     shifts = shifts_of_schedules(old, new)
     return gate(foreseen(brief_with(old, grid, effort(grid), memory)), shifts, tolerance)
+
+
+def as_before(machine: Machine, before: Machine) -> Machine:
+    """The mission's machine with the modules as fast as they were.
+
+    In simulated time rates say how fast a module is; measured in real time they say how fast it is
+    there, and not on the mission's machine.
+    """
+    if before.host:
+        return machine
+    return replace(machine, rates={**machine.rates, **before.rates})
 
 
 def foreseen(briefing: Briefing) -> Foresight:

@@ -126,3 +126,8 @@ def test_of_a_deadline_on_another_clock_only_the_event_counts():
     both = one.earlier(Deadline(other, 1.0, event=lambda: True))
     assert both.at == 5.0
     assert both.expired()
+
+
+def test_a_work_clock_is_that_of_a_machine():
+    with pytest.raises(AnytimeError, match="a work clock of 'fast'; give a Machine"):
+        WorkClock("fast")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
 import anytime
@@ -89,3 +90,13 @@ def test_what_cannot_be_set_is_refused_in_one_line():
         @anytime.module(quality=float)
         def wrong(image, size=anytime.knob([1, 2])):
             yield image
+
+
+@pytest.mark.parametrize("values", [[1, 1.0], [float("nan"), 1], [True, 1]])
+def test_values_of_a_knob_are_different_and_equal_to_themselves(values):
+    with pytest.raises(AnytimeError, match="a knob of"):
+        anytime.knob(values)
+
+
+def test_whole_numbers_of_numpy_are_numbers():
+    assert anytime.knob(np.array([3, 1])).values == (3, 1)

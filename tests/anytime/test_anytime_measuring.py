@@ -523,3 +523,8 @@ def test_numbers_of_numpy_are_measured_stored_and_saved(tmp_path):
         store=tmp_path / "s.runs",
     )
     library.save(tmp_path / "library")
+
+
+def test_an_executor_is_named_or_submits():
+    with pytest.raises(AnytimeError, match="executor=4; give"):
+        anytime.measure(look, [SimpleNamespace(scene=Scene(0.5))], seconds=1, executor=4)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -111,3 +112,25 @@ def test_it_says_how_things_stand():
     activity = STEER.start(clock=WorkClock(MACHINE))
     activity.run(0.2, image=1.0)
     assert repr(activity) == "<activity of steer, 1 calls: divided as compiled>"
+
+
+def test_a_machine_that_was_too_slow_for_the_budget_is_tried_again():
+    @anytime.module(quality=lambda value, problem: value, name="thirds")
+    def thirds(x):
+        for step in (1, 2, 3):
+            anytime.charge(1)
+            yield x * step / 3
+
+    def machine(rate):
+        return Machine("m").with_rate("thirds", rate)
+
+    problems = [SimpleNamespace(x=0.1 * i) for i in range(5, 11)]
+    library = anytime.measure(thirds, problems, seconds=1.0, clock=lambda: WorkClock(machine(0.01)))
+    clock = WorkClock(machine(0.03))
+    with compiler.compile(thirds, library).start(clock=clock) as activity:
+        hot = [bool(activity.run(0.025, x=1.0)) for _ in range(100)]
+        clock.machine = machine(0.01)
+        cool = [activity.run(0.025, x=1.0).value for _ in range(100)]
+        assert hot.count(True) < 30  # now and then it is tried
+        assert cool[-50:] == [pytest.approx(2 / 3)] * 50
+        assert not activity.drift

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from anytime import WorkClock, measure
+import anytime
+import compiler
+from anytime import Machine, WorkClock, measure
 from compiler import compile
 from compiler.calibrating import _blocks, _isotonic, _standing, calibrate_by_running
 from compiler.division import divide, expected_quality, moments_within
@@ -173,3 +176,24 @@ def test_problems_of_profiles_measured_apart_are_put_side_by_side():
     lived = replay.achieved(shares, sum(shares)).mean()
     level = expected_quality(made, moments_within(made, shares))
     assert lived == pytest.approx(level, abs=0.05)
+
+
+def test_a_last_step_that_is_cheaper_than_the_first_is_promised_where_it_is_begun():
+    @anytime.module(quality=lambda value, problem: value, name="late")
+    def late(x):
+        for work, quality in ((5, 0.5), (1, 0.9)):
+            anytime.charge(work)
+            yield quality * x
+
+    machine = Machine("m").with_rate("late", 0.01)
+    library = anytime.measure(
+        late,
+        [SimpleNamespace(x=1 - 1e-9 * i) for i in range(30)],
+        seconds=1.0,
+        clock=lambda: WorkClock(machine),
+    )
+    compiled = compiler.compile(late, library)
+    for budget in (0.05, 0.06, 0.08, 0.12, 0.2, 5.0):
+        achieved = compiled.run(budget, clock=WorkClock(machine), x=1.0).value
+        assert compiled.promise(budget) <= achieved + 1e-6
+    assert compiled.promise(5.0) == pytest.approx(0.9, abs=1e-6)

@@ -105,6 +105,9 @@ def test_another_decision_leaves_what_came_before_it_as_it_was(briefing, tmp_pat
     ("fork", "message"),
     [
         ({"frame": 99, "see": 1.0}, "the mission had frames 0 to"),
+        ({"frame": 1.5, "see": 1.0}, "frame is 1.5; the mission had frames 0 to"),
+        ({"frame": 1, "see": "long"}, "see gets 'long' s"),
+        ({"frame": 1, "speed": "fast"}, "speed is 'fast'"),
         ({"frame": 1, "hear": 1.0}, "no call 'hear' to fork; there are see, find_path"),
         ({"frame": 1, "see": -1.0}, "it must be a finite number >= 0"),
         ({"frame": 1, "speed": 0.0}, "the mission has 1.0 to 10.0 cells/s"),

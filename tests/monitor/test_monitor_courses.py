@@ -120,24 +120,28 @@ def test_speed_rises_with_what_is_left_to_do_before_the_value_falls():
     assert speeds[0] < speeds[-1]
 
 
-def test_what_is_promised_is_what_missions_are_worth():
+@pytest.mark.parametrize("idle", [0.0, 8.0])
+def test_what_is_promised_is_what_missions_are_worth(idle):
+    mission = replace(MISSION, energy=Energy(0.2, 0.08, 0.03, idle))
+    table = solve(mission, course(), 160.0)
     rng = np.random.default_rng(1)
     nets = []
     for _ in range(200):
-        time, energy, to_walk = 0.0, 0.0, 240.0
-        time += TABLE.course.contract
+        time, energy, to_walk = 0.0, mission.energy.idle * mission.job, 240.0
+        time += table.course.contract
         while to_walk > 0:
-            row = int(np.searchsorted(TABLE.course.beyond, to_walk, side="right")) - 1
-            pick = int(rng.integers(TABLE.course.walked.shape[1]))
-            _, speed = TABLE.walking(time, to_walk, 16.0, 2.0, TABLE.course)
-            walked = min(TABLE.course.walked[row, pick], to_walk)
+            row = int(np.searchsorted(table.course.beyond, to_walk, side="right")) - 1
+            pick = int(rng.integers(table.course.walked.shape[1]))
+            _, speed = table.walking(time, to_walk, 16.0, 2.0, table.course)
+            walked = min(table.course.walked[row, pick], to_walk)
             drive = walked / speed
-            energy += drive * float(MISSION.energy.power(speed))
             arrives = walked >= to_walk
-            time += drive if arrives else max(drive, TABLE.course.contract)
-            to_walk = 0.0 if arrives else (to_walk - walked) * TABLE.course.changes[row, pick]
-        nets.append(MISSION.net(True, time + MISSION.job, energy))
-    promised = TABLE.standing(TABLE.course.contract, 240.0)
+            frame = drive if arrives else max(drive, table.course.contract)
+            energy += drive * float(mission.energy.power(speed)) + idle * (frame - drive)
+            time += frame
+            to_walk = 0.0 if arrives else (to_walk - walked) * table.course.changes[row, pick]
+        nets.append(mission.net(True, time + mission.job, energy))
+    promised = table.standing(table.course.contract, 240.0)
     assert np.mean(nets) == pytest.approx(promised, rel=0.03)
 
 

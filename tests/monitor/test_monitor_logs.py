@@ -168,6 +168,26 @@ def test_a_belief_that_lies_off_the_scene_is_refused(tmp_path, mission, floor, r
         read_log(changed(path, 2, json.dumps(line)))
 
 
+@pytest.mark.parametrize(
+    ("line", "change", "reason"),
+    [
+        (1, {"fixed": {"shares": 3}}, ":1: fixed: "),
+        (None, {"kind": "regret", "frame": 0, "forks": [[{"other": 1.0}, 1.0, 2.0]]}, "a call"),
+    ],
+    ids=["a fixed division that is none", "a fork of another call"],
+)
+def test_what_the_page_would_fall_over_is_refused_when_it_is_read(
+    tmp_path, mission, floor, report, line, change, reason
+):
+    path = write_log(tmp_path / "a.jsonl", mission, floor, report)
+    if line is None:
+        path.write_text(path.read_text() + json.dumps(change) + "\n")
+    else:
+        changed(path, line, json.dumps(json.loads(path.read_text().splitlines()[0]) | change))
+    with pytest.raises(AnytimeError, match=reason):
+        read_log(path)
+
+
 def test_an_empty_file_and_no_file_are_no_logs(tmp_path):
     (tmp_path / "empty.jsonl").touch()
     with pytest.raises(AnytimeError, match="first line must be the mission"):

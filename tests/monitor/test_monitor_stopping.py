@@ -275,6 +275,65 @@ def test_a_rule_is_chosen_if_it_is_a_standard_error_better_and_nearly_the_best(s
         return difference.mean() / max(difference.std(ddof=1) / np.sqrt(10), 1e-12)
 
     best = min(losses, key=losses.get)
-    nearly = [name for name in losses if apart(name, best) <= 1.0]
-    better = apart("fixed", nearly[0]) >= 1.0
-    assert choice.name == (nearly[0] if better else "fixed")
+    nearly = [name for name in learners if apart(name, best) <= 1.0]
+    better = [name for name in nearly if apart("fixed", name) >= 1.0]
+    assert choice.name == (better[0] if better else "fixed")
+
+
+def test_a_run_in_which_nothing_can_be_had_does_not_decide_alone():
+    seconds = np.arange(0.0, 20.0)
+    scale = np.random.default_rng(0).choice([3.0, 8.0], (60, 1))
+    quality = 1 - np.exp(-seconds / scale)
+    task = Task(lambda q, t: 100 * q - t)
+    names = []
+    for stuck in (False, True):
+        if stuck:
+            quality[0] = 0.0
+        chosen = choose(
+            Runs(seconds, quality, quality), task, LEARNERS, folds=5, rng=np.random.default_rng(1)
+        )
+        names.append(chosen.name)
+        assert all(np.abs(losses).max() < 100 for losses in chosen.losses.values())
+    assert names == ["forecast", "forecast"]
+
+
+def test_a_rule_that_is_better_than_fixed_is_taken_though_one_before_it_is_not():
+    noise = np.random.default_rng(398).normal(0.5, 0.15, (20, 3))
+    quality = np.clip(noise + np.array([0, 0.02, 0.03]), 0.05, 1)
+
+    def at(level):
+        return lambda runs, task: (
+            lambda history: STOP if len(history.seconds) and history.quality[-1] > level else 1.0
+        )
+
+    chosen = choose(
+        Runs([1.0, 2.0, 3.0], quality, quality),
+        Task(lambda q, t: q + 0 * t),
+        {"one": at(0.75), "two": at(0.55)},
+        folds=5,
+        rng=np.random.default_rng(0),
+    )
+    assert errors_apart(chosen.losses["fixed"], chosen.losses["two"]) >= 1.0
+    assert chosen.name == "two"
+
+
+def test_no_rule_may_be_called_fixed():
+    runs = Runs([1.0, 2.0], np.ones((4, 2)), np.ones((4, 2)))
+    with pytest.raises(AnytimeError, match="'fixed' is the fixed contract"):
+        choose(
+            runs, Task(lambda q, t: q), {"fixed": fixed_contract}, folds=2,
+            rng=np.random.default_rng(0),
+        )  # fmt: skip
+
+
+def test_a_rule_cannot_change_what_was_recorded():
+    quality = np.linspace(0, 1, 6).reshape(2, 3)
+    runs = Runs([1.0, 2.0, 3.0], quality, quality)
+
+    def cheats(history):
+        history.quality[:] = 1.0
+        return STOP
+
+    with pytest.raises(ValueError, match="read-only"):
+        stop_runs(lambda history: cheats(history) if len(history.seconds) else 1.0, runs, TASK)
+    assert (quality == np.linspace(0, 1, 6).reshape(2, 3)).all()

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from anytime import Machine
 from anytime.__main__ import main
 from compiler import compile
 from experiments import shipped
 from monitor import Energy, Mission, Value
 from monitor.calibration import Steady
 from monitor.rhythms import Lived
+from monitor.robots.comparing import as_before
 from monitor.robots.navigation import navigate
 from monitor.shifts import GROUPS, Shift, Shifts
 from monitor.states import Situation
@@ -80,3 +84,11 @@ def test_the_command_refuses_what_cannot_be_compared_in_one_line(tmp_path, capsy
         told = capsys.readouterr()
         assert (code, told.out, told.err.count("\n")) == (2, "", 1)
         assert says in told.err
+
+
+def test_modules_live_at_the_rates_of_simulated_time_and_not_at_those_of_another_computer():
+    mission = Machine("robot").with_rate("see", 0.25).with_rate("drive", 0.1)
+    simulated = Machine("slow").with_rate("see", 0.5)
+    there = as_before(mission, simulated)
+    assert (there.rates["see"].per_work, there.rates["drive"].per_work) == (0.5, 0.1)
+    assert as_before(mission, replace(simulated, host="a laptop")) is mission

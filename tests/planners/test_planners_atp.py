@@ -222,7 +222,12 @@ def test_mistakes_are_named():
         list(steps(domain, (1, 1), (8, 8)))
     with pytest.raises(AnytimeError, match="the domain is bool"):
         list(steps(np.ones((9, 9), bool), (1, 1), (8, 8)))
+    with pytest.raises(AnytimeError, match="the domain is a str; give probabilities"):
+        Grid("map")
     grid = Grid.known(np.ones((9, 9), bool))
+    grid.update(0, 0, [[1.0, 0.0]])
+    with pytest.raises(AnytimeError, match=r"the domain is \[3\], it must be \[height, width\]"):
+        grid.update(0, 0, [0.0, 1.0, 0.0])
     with pytest.raises(AnytimeError, match="not all on the map of 9 rows"):
         grid.update(8, 8, np.zeros((2, 2), np.float32))
     with pytest.raises(AnytimeError, match="the map is known"):

@@ -148,6 +148,8 @@ def test_other_mistakes_are_named_too():
         astar(free, (0, 0), (1, 1), 6)
     with pytest.raises(AnytimeError, match=r"weight is 0\.5"):
         weighted_astar(free, (0, 0), (1, 1), 0.5)
+    with pytest.raises(AnytimeError, match="weight is 'much'"):
+        weighted_astar(free, (0, 0), (1, 1), "much")  # pyright: ignore[reportArgumentType]
     with pytest.raises(AnytimeError, match="the map is float64"):
         astar(np.ones((3, 3)), (0, 0), (1, 1))  # pyright: ignore[reportArgumentType]
     with pytest.raises(AnytimeError, match="the map is a list"):
