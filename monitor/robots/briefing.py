@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from anytime import ProfileLibrary, WallClock, WorkClock
-from anytime.clocks import Clock
+from anytime.clocks import Clock, is_number
 from anytime.errors import AnytimeError
 from anytime.faults import Schedule
 from compiler import CompiledProgram, compile
@@ -198,8 +198,8 @@ class Briefing:
 
         def again(frame: int, shares: Mapping[str, float], speed: float | None) -> Report:
             slow, fast = self.grid.mission.speeds
-            if speed is not None and not slow <= speed <= fast:
-                raise AnytimeError(f"speed is {speed}; the mission has {slow} to {fast} cells/s")
+            if speed is not None and not (is_number(speed) and slow <= speed <= fast):
+                raise AnytimeError(f"speed is {speed!r}; the mission has {slow} to {fast} cells/s")
             other = replace(monitor, policy=forked(monitor.policy, frame, shares, speed))
             return self.live(other, seed)
 
