@@ -50,6 +50,11 @@ def is_number(value: object) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool)  # pyright: ignore[reportUnnecessaryIsInstance]
 
 
+DECIMALS, INSTANT = 12, 1e-12
+"""Decimals of a second that moments are kept to, and how far apart two of them are one: sums of the
+same steps in another order differ in the last bit."""
+
+
 class WorkClock:
     """Simulated time, which advances by each module's own rate on a given machine.
 

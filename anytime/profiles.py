@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from anytime.clocks import DECIMALS
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
 from anytime.pictures import clipped, duration, figure, line_chart, number, sparkline
@@ -42,8 +43,8 @@ class Recording:
 
     def __post_init__(self) -> None:
         # The same steps added in another order differ in the last bit, and are the same moment.
-        object.__setattr__(self, "seconds", np.round(self.seconds, 12))
-        object.__setattr__(self, "end", (round(float(self.end[0]), 12), float(self.end[1])))
+        object.__setattr__(self, "seconds", np.round(self.seconds, DECIMALS))
+        object.__setattr__(self, "end", (round(float(self.end[0]), DECIMALS), float(self.end[1])))
 
 
 @dataclass(frozen=True)

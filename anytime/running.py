@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from anytime import calling, isolation
-from anytime.clocks import Clock, Deadline, WallClock
+from anytime.clocks import DECIMALS, INSTANT, Clock, Deadline, WallClock
 from anytime.collecting import undisturbed
 from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
@@ -140,7 +140,7 @@ class Run:
         average = self.step_seconds[0]
         for seconds in self.step_seconds[-8:]:
             average += 0.4 * (min(seconds, 4 * average + 1e-6) - average)
-        return average <= left + 1e-12  # a step that just fits does, whatever rounding says
+        return average <= left + INSTANT
 
     def call(self, module: Module, arguments: tuple[Any, ...]) -> Any:
         """A module called like a function inside this run: run with what is left."""
@@ -362,7 +362,7 @@ def _call(current: Run, inputs: tuple[Any, ...], filled: dict[str, Any]) -> bool
 
 def _result(current: Run, complete: bool, fault: Fault | None) -> Result:
     now = current.deadline.clock.now()
-    overrun = round(max(0.0, now - max(current.deadline.at, current.started)), 12)
+    overrun = round(max(0.0, now - max(current.deadline.at, current.started)), DECIMALS)
     if not current.history:
         status = Status.NO_RESULT
     elif complete and fault is None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anytime import running
-from anytime.clocks import Clock, Deadline, WallClock, is_number
+from anytime.clocks import DECIMALS, Clock, Deadline, WallClock, is_number
 from anytime.errors import AnytimeError
 from anytime.joins import Several
 from anytime.modules import Module
@@ -275,7 +275,7 @@ class CompiledProgram:
             None if output is None else output.value,
             fault,
             now - execution.started,
-            round(max(0.0, now - max(deadline.at, execution.started)), 12),
+            round(max(0.0, now - max(deadline.at, execution.started)), DECIMALS),
             last.history if output is not None and last is not None else (),
             sum(part.work for part in parts.values()),
             dict(parts),

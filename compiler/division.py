@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.clocks import DECIMALS, INSTANT
 from anytime.errors import AnytimeError
 from anytime.joins import Several
 from compiler import costs, grouped
@@ -47,11 +48,11 @@ class Frontier:
 
     def __post_init__(self) -> None:
         # To the picosecond, as the moments of recordings are.
-        object.__setattr__(self, "budgets", np.round(self.budgets, 12))
+        object.__setattr__(self, "budgets", np.round(self.budgets, DECIMALS))
 
     def index(self, seconds: float) -> int:
         """The best division for this budget; -1 when it is below the least one."""
-        return int(np.searchsorted(self.budgets, seconds + 1e-12, side="right")) - 1
+        return int(np.searchsorted(self.budgets, seconds + INSTANT, side="right")) - 1
 
     def promise(self, seconds: float) -> float:
         """Expected quality with this budget; 0 below the least one."""
@@ -233,7 +234,7 @@ def _merged(
         ends = (totals[:, None] + budgets).ravel()
         worth = (values[:, None] + gains).ravel()
         # Who gets no time is never late: what came before ended by an earlier deadline.
-        late = ends > rule.deadlines[place] + 1e-12
+        late = ends > rule.deadlines[place] + INSTANT
         kept = _best_first(ends, np.where(late, -np.inf, worth), -np.inf)
         before, added = np.divmod(kept, len(budgets))
         totals, values, shares = ends[kept], worth[kept], shares[before] + rows[added]

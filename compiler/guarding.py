@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from anytime.clocks import INSTANT
 from anytime.profiles import Profile
 from anytime.running import Run
 
-ROUNDING = 1e-12  # seconds by which sums of the same steps may differ
 STEPS = 32  # steps whose durations are kept one by one; the last stands for all later ones
 
 
@@ -49,11 +49,11 @@ def guard(steps: Steps | None, share_ends: float, hard_end: float) -> Callable[[
     def may_step(run: Run) -> bool:
         now = run.deadline.clock.now()
         index = min(len(run.history), len(known.median) - 1)
-        if now + known.p95[index] > hard_end + ROUNDING and run.history:
+        if now + known.p95[index] > hard_end + INSTANT and run.history:
             return False
         if not run.history:
             return now < hard_end
-        return now + known.median[index] <= share_ends + ROUNDING
+        return now + known.median[index] <= share_ends + INSTANT
 
     return may_step
 

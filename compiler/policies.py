@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.clocks import INSTANT
 from anytime.joins import Branch, Known
 from anytime.programs import Call, Input, Join, Program
 
@@ -94,7 +95,7 @@ class Policy:
 
     def plan(self, seconds: float) -> Plan | None:
         """The plan for a budget; None below the least one."""
-        inside = [plan for plan in self.plans if plan.budget <= seconds + 1e-12]
+        inside = [plan for plan in self.plans if plan.budget <= seconds + INSTANT]
         return inside[-1] if inside else None
 
     def share(

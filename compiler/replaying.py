@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.clocks import INSTANT
 from anytime.joins import Best
 from anytime.profiles import Profile, Recording
 from anytime.programs import Join, Program, upstream
@@ -26,7 +27,6 @@ from compiler.tables import Table
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 PATHS = 1200  # lives in all, shared by the problems
-EPSILON = 1e-12
 BETTER = 1.1  # times as good, what is called 10 % better
 
 
@@ -110,7 +110,7 @@ class Replay:
                 count = (now[:, None] + seconds <= budget + 1e-9).sum(axis=1)
             elif call.module.contract:
                 ends = np.maximum(share_end, np.minimum(now + first, hard))
-                count = (seconds <= (ends - now)[:, None] + EPSILON).sum(axis=1)
+                count = (seconds <= (ends - now)[:, None] + INSTANT).sum(axis=1)
             elif call.module.generator and self.steps[call.module.name].median:
                 count = self._guarded(call.module.name, now, seconds, share_end, hard)
             else:
@@ -200,7 +200,7 @@ class Replay:
         median = np.array([steps.median[place] for place in index])
         p95 = np.array([steps.p95[place] for place in index])
         at = now[:, None] + seconds[:, :-1]
-        refused = (at + median > share_end + EPSILON) | (at + p95 > hard + EPSILON)
+        refused = (at + median > share_end + INSTANT) | (at + p95 > hard + INSTANT)
         stops = np.hstack([refused, np.ones((len(refused), 1), dtype=bool)])
         count = 1 + np.asarray(stops.argmax(axis=1), dtype=np.intp)
         return np.where(now < hard, count, 0)

@@ -27,6 +27,7 @@ class Stop:
 
 
 STOP = Stop()
+TINY = 1e-9  # of a second, within which two times of a grid are one
 LEAST_WORTH = 0.1  # of the mean of the best utilities, that a run counts for in shares
 
 
@@ -170,6 +171,11 @@ def _index(seconds: Floats, at: float, least: int) -> int:
     """Index of the first time that is not before `at`, at least `least`, at most the last."""
     index = int(np.searchsorted(seconds, at * (1 - 1e-9)))  # a sum of times may be off by a bit
     return min(max(index, least), len(seconds) - 1)
+
+
+def until(now: float, then: float) -> float:
+    """Seconds from one time of a grid to a later one, as a rule returns them."""
+    return max(then - now, TINY)
 
 
 def fixed_contract(runs: Runs, task: Task) -> StoppingRule:

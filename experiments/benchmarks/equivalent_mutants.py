@@ -32,7 +32,7 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
         ): "a division worth the same is as good to go on from",
         ("kept = values > 1e-9", "Gt → GtE"): _TIE,
         ("return order[ordered > before + 1e-9]", "Gt → GtE"): _TIE,
-        ("late = ends > rule.deadlines[place] + 1e-12", "Gt → GtE"): _TIE,
+        ("late = ends > rule.deadlines[place] + INSTANT", "Gt → GtE"): _TIE,
         (
             "inside = np.flatnonzero(totals <= budget)",
             "LtE → Lt",

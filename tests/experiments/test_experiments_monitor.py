@@ -13,7 +13,7 @@ from experiments.benchmarks.monitor import decision_times
 from experiments.benchmarks.monitor_kinds import LENGTHS, kinds
 from experiments.benchmarks.monitor_traces import cross_validate, read_traces
 from monitor.decision_table import solve
-from monitor.stopping_rules import forecast
+from monitor.stopping_regressions import forecast
 
 
 def write_traces(path, count=20, length=16):

@@ -22,7 +22,8 @@ from monitor.stopping import (
     standard_error,
     stop_runs,
 )
-from monitor.stopping_rules import LEARNERS, dynamic_programming, forecast, true_of_seen
+from monitor.stopping_regressions import forecast, true_of_seen
+from monitor.stopping_rules import LEARNERS, dynamic_programming
 
 SECONDS = np.arange(1.0, 31.0)
 TASK = Task(lambda quality, seconds: 100.0 * quality - seconds)
