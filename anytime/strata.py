@@ -51,11 +51,8 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
     diagonal, and a module that is as good as its worst input is not taken for one as good as
     their mean.
     """
-    # Equal points are one corner, and share its weight.
-    equal = (np.abs(points[:, :, None, :] - points[:, None, :, :]) < SAME).all(axis=3)
-    equal &= there[:, :, None] & there[:, None, :]
-    first = equal.argmax(axis=2)
-    every, there = there, there & (first == np.arange(points.shape[1]))
+    corner = _corners(points, there)
+    every, there = there, there & (corner == np.arange(points.shape[1]))
     count = len(points)
     away = points - target[:, None, :]
     off = away - away.mean(axis=2, keepdims=True)
@@ -77,8 +74,25 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
         best[better] = cost[better]
     weights = np.zeros(there.shape)
     weights[rows[:, None], near] = found
-    shared = np.take_along_axis(weights, first, axis=1) / np.maximum(equal.sum(axis=2), 1)
-    return np.where(every, shared, 0.0)
+    sizes = np.bincount((rows[:, None] * points.shape[1] + corner).ravel(), minlength=every.size)
+    shared = weights / np.maximum(sizes.reshape(every.shape), 1)
+    return np.where(every, np.take_along_axis(shared, corner, axis=1), 0.0)
+
+
+def _corners(points: Floats, there: Mask) -> NDArray[np.intp]:
+    """The place of the first point that is equal to each, [n, R]: one corner, whose weight they
+    share."""
+    runs = np.arange(points.shape[1])
+    # Powers of π are independent of each other: sums of qualities times them are equal for equal
+    # qualities alone. What is not there is equal to nothing.
+    key = points @ np.pi ** -np.arange(points.shape[2], dtype=float)
+    key = np.where(there, key, 2.0 * points.shape[2] + runs)
+    order = np.argsort(key, axis=1, kind="stable")
+    fresh = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1.0) > SAME
+    first = np.maximum.accumulate(np.where(fresh, runs, 0), axis=1)
+    corner = np.empty_like(order)
+    np.put_along_axis(corner, order, np.take_along_axis(order, first, axis=1), axis=1)
+    return corner
 
 
 def _barycentric(away: Floats) -> tuple[Floats, Mask]:

@@ -63,7 +63,7 @@ class Activity:
     def drift(self) -> Mapping[str, float]:
         """The ratios by which time was divided anew, of the modules that have left their profile;
         empty where all is as measured."""
-        return {name: ratio for name, ratio in self._divided.items() if not _alike(ratio, 1.0)}
+        return {name: ratio for name, ratio in self._divided.items() if ratio != 1.0}
 
     def run(self, seconds: float, **inputs: Any) -> Result:
         """Run the program once within a budget of seconds; see `CompiledProgram.run`.
@@ -96,31 +96,38 @@ class Activity:
         steps = self._measured.steps.get(module.name)
         if steps is None or not steps.median:
             return
-        took = np.diff([change.seconds for change in part.history], prepend=0.0)
-        usual = np.array(
-            [steps.median[min(index, len(steps.median) - 1)] for index in range(len(took))]
-        )
+        took = np.diff([change.seconds for change in part.history], prepend=0.0).tolist()
+        ratio = steps.pace(took)
         if "memory" in module.filled:  # the first result is an old one
-            took, usual = took[1:], usual[1:]
-        if not len(took) or took.sum() <= 0 or usual.sum() <= 0:
+            ratio = replace(steps, median=steps.median[1:] or steps.median).pace(took[1:])
+        if math.isnan(ratio):
             return
-        ratio = float(np.clip(took.sum() / usual.sum(), 1.0 / WILDEST, WILDEST))
+        ratio = min(max(ratio, 1.0 / WILDEST), WILDEST)
         old = self._logs[module.name]
         self._logs[module.name] = old + WEIGHT * (math.log(ratio) - old)
 
     def _divide(self) -> None:
         """Divide time anew when a module's ratio has moved away from the division in force."""
         ratios = self.ratios
-        moved = [name for name, ratio in ratios.items() if not _alike(ratio, self._divided[name])]
+        moved = [
+            name
+            for name, ratio in ratios.items()
+            if not self._alike(name, ratio, self._divided[name])
+        ]
         if not moved:
             return
         self._divided = {
-            name: 1.0 if _alike(ratio, 1.0) else ratio for name, ratio in ratios.items()
+            name: 1.0 if self._alike(name, ratio, 1.0) else ratio for name, ratio in ratios.items()
         }
         self.why = "; ".join(
             f"{name} takes {ratios[name]:.2f} times as long as measured" for name in moved
         )
         self._program = _scaled(self._measured, self._divided)
+
+    def _alike(self, module: str, one: float, other: float) -> bool:
+        """Whether two ratios may be those of one machine on other problems."""
+        steps = self._measured.steps.get(module)
+        return abs(math.log(one / other)) <= max(math.log(DRIFT), steps.spread if steps else 0.0)
 
     def __enter__(self) -> Activity:
         return self
@@ -138,10 +145,6 @@ class Activity:
         return clipped(f"<activity of {self._program.name}, {self.calls} calls: {state}>")
 
 
-def _alike(one: float, other: float) -> bool:
-    return 1.0 / DRIFT <= one / other <= DRIFT
-
-
 def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledProgram:
     """The program with its modules so many times as slow as measured, divided anew.
 
@@ -157,6 +160,7 @@ def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledPr
         name: Steps(
             tuple(ratios.get(name, 1.0) * gap for gap in known.median),
             tuple(ratios.get(name, 1.0) * gap for gap in known.p95),
+            known.spread,
         )
         for name, known in program.steps.items()
     }

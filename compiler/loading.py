@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,10 @@ def _restore(file: Path, stored: StoredSchedule, modules: Sequence[Module]) -> C
         frontier=frontier,
         policy=policy,
         calibration=Calibration(*np.array(stored.calibration).T),
-        steps={name: Steps(tuple(rows[0]), tuple(rows[1])) for name, rows in stored.steps.items()},
+        steps={
+            name: Steps(tuple(median), tuple(p95), spread)
+            for name, (median, p95, (spread,)) in stored.steps.items()
+        },
         machine=stored.machine,
         regret=stored.regret,
     )
@@ -307,11 +310,14 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
         raise AnytimeError(f"{path}: a regret of {stored.regret}; it lies in [0, 1]")
     for name, rows in stored.steps.items():
         if (
-            len(rows) != 2
+            len(rows) != 3
             or len(rows[0]) != len(rows[1])
-            or min([*rows[0], *rows[1]], default=0) < 0
+            or len(rows[2]) != 1
+            or min(chain(*rows)) < 0
         ):
-            raise AnytimeError(f"{path}: steps.{name} is not two rows of seconds >= 0")
+            raise AnytimeError(
+                f"{path}: steps.{name} is not two rows of seconds >= 0 and their spread"
+            )
 
 
 def check_calibration(path: Path, rows: Floats) -> None:

@@ -138,7 +138,8 @@ class Replay:
         """The same with a module `factor` times as fast."""
         records, steps = self.records[module], self.steps[module]
         quick = replace(records, seconds=records.seconds / factor, ends=records.ends / factor)
-        pace = Steps(tuple(s / factor for s in steps.median), tuple(s / factor for s in steps.p95))
+        median, p95 = (tuple(s / factor for s in row) for row in (steps.median, steps.p95))
+        pace = replace(steps, median=median, p95=p95)
         tables = tuple(t.faster(factor) if t.module == module else t for t in self.tables)
         return replace(
             self,

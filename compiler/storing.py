@@ -18,7 +18,7 @@ from compiler.objectives import Objective
 from compiler.policies import Policy
 from compiler.tables import Table
 
-SCHEMA = "anytime.schedule/3"
+SCHEMA = "anytime.schedule/4"
 
 
 class StoredArgument(Stored):
@@ -149,7 +149,9 @@ def save(compiled: Compiled, path: Path) -> None:
         promised=frontier.promised.tolist(),
         exact=frontier.exact,
         calibration=compiled.calibration.rows(),
-        steps={name: [list(s.median), list(s.p95)] for name, s in compiled.steps.items()},
+        steps={
+            name: [list(s.median), list(s.p95), [s.spread]] for name, s in compiled.steps.items()
+        },
         regret=compiled.regret,
         seen=seen,
     )

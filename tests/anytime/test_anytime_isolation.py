@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import anytime
-from anytime import AnytimeError, Deadline, Machine, Status, WorkClock, naming
+from anytime import AnytimeError, Deadline, Machine, Status, WallClock, WorkClock, naming
 from anytime.isolation import HUNG
 from anytime.modules import Limits
 from anytime.workers import workers
@@ -136,6 +136,37 @@ def test_where_no_worker_can_start_the_run_says_how_they_died(monkeypatch):
         "of the last that was never ready: the worker exited with 1"
     )
     workers.close()
+
+
+def test_workers_that_die_one_after_the_other_end_even_a_run_without_a_deadline(monkeypatch):
+    workers.close()
+    monkeypatch.setattr("sys.executable", "/bin/false")
+    result = anytime.run(count, 4, seconds=float("inf"))
+    assert result.status is Status.NO_RESULT
+    assert "the worker exited with 1" in result.fault.message
+    workers.close()
+
+
+def test_an_event_ends_the_wait_for_a_worker_that_is_not_ready_yet():
+    workers.close()
+    asked = []
+
+    def event():
+        asked.append(None)
+        return len(asked) > 2  # it begins, and waits
+
+    result = anytime.run(count, 4, deadline=Deadline(WallClock(), event=event))
+    assert (result.status, result.fault) == (Status.NO_RESULT, None)
+
+
+def test_who_looks_on_and_fails_ends_the_run_with_a_fault_as_in_process():
+    def falls(value, change):
+        raise TimeoutError("I cannot look")
+
+    for module in (count, in_process(count)):
+        result = anytime.run(module, 4, seconds=LEFT, on_result=falls)
+        assert (result.status, result.value) == (Status.INTERRUPTED, 0)
+        assert result.fault.kind == "TimeoutError"
 
 
 # What a module may do, and what comes of it

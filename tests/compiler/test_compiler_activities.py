@@ -134,3 +134,27 @@ def test_a_machine_that_was_too_slow_for_the_budget_is_tried_again():
         assert hot.count(True) < 30  # now and then it is tried
         assert cool[-50:] == [pytest.approx(2 / 3)] * 50
         assert not activity.drift
+
+
+def test_problems_of_another_kind_are_not_another_machine():
+    @anytime.module(quality=lambda value, problem: value, name="varied")
+    def varied(x):
+        count, each = (3, 6) if x < 0.75 else (12, 1)
+        for step in range(count):
+            anytime.charge(each)
+            yield x * (step + 1) / count
+
+    def clock(rate=0.004):
+        return WorkClock(Machine("m").with_rate("varied", rate))
+
+    problems = [SimpleNamespace(x=i / 10) for i in range(5, 11)]
+    schedule = compiler.compile(varied, anytime.measure(varied, problems, seconds=1.0, clock=clock))
+    for x in (0.5, 1.0):
+        with schedule.start(clock=clock()) as activity:
+            for _ in range(60):
+                activity.run(0.08, x=x)
+            assert not activity.drift
+        with schedule.start(clock=clock(0.016)) as activity:
+            for _ in range(60):
+                activity.run(0.3, x=x)
+            assert activity.drift
