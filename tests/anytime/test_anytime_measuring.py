@@ -528,3 +528,9 @@ def test_numbers_of_numpy_are_measured_stored_and_saved(tmp_path):
 def test_an_executor_is_named_or_submits():
     with pytest.raises(AnytimeError, match="executor=4; give"):
         anytime.measure(look, [SimpleNamespace(scene=Scene(0.5))], seconds=1, executor=4)
+
+
+def test_a_clock_is_made_for_each_run_and_not_given():
+    clock = WorkClock(MACHINE)
+    with pytest.raises(AnytimeError, match="give what makes a run's clock"):
+        anytime.measure(look, [SimpleNamespace(scene=Scene(0.5))], seconds=1, clock=clock)

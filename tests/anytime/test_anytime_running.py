@@ -608,3 +608,8 @@ def test_an_error_that_cannot_say_what_it_is_is_a_fault_all_the_same():
     result = on_work_clock(breaks, seconds=9.0)
     assert result.value == "good"
     assert result.fault.kind == "BrokenError"
+
+
+def test_a_deadline_is_an_instant_and_no_number():
+    with pytest.raises(AnytimeError, match=r"deadline is 0\.1; give Deadline\.after"):
+        anytime.run(count, deadline=0.1)

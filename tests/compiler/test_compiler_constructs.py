@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 
@@ -414,3 +415,26 @@ def test_what_cannot_be_compiled_is_refused_with_its_place_and_cure(function, sa
 def test_outside_a_program_constructs_are_refused():
     with pytest.raises(AnytimeError, match="branch is called in a function decorated with"):
         compiler.branch(True, 1, 2, chance=0.5)
+
+
+def test_a_program_that_answers_tests_or_has_several_results_is_no_module():
+    @compiler.program
+    def safe(x):
+        return compiler.all_of(check(x), check(x), chances=(0.5, 0.5))
+
+    @compiler.program
+    def both(x):
+        return check(x), check(x)
+
+    machine = Machine("m").with_rate("check", 0.01)
+    problems = [SimpleNamespace(x=x) for x in (0.2, 0.9)]
+    for read, what in ((safe, "the answer of tests"), (both, "several outputs")):
+        library = anytime.measure(read, problems, seconds=1.0, clock=lambda: WorkClock(machine))
+        with pytest.raises(AnytimeError, match=f"cannot be a module.* it returns {what}"):
+            _ = compiler.compile(read, library).module
+
+
+@anytime.module(quality=lambda answer, problem: 1.0)
+def check(x):
+    anytime.charge(1)
+    yield x > 0.5
