@@ -17,6 +17,7 @@ from anytime.errors import AnytimeError, OutsideRunError
 from anytime.modules import Module
 from anytime.results import Change, Fault, Result, Status
 
+RECENT = 8  # steps from which the next is expected
 STILL = 20_000  # check-points in a row without any time passing, which no clock can ever end
 
 
@@ -137,8 +138,10 @@ class Run:
             return False
         if not self.history or not self.step_seconds:
             return True
-        average = self.step_seconds[0]
-        for seconds in self.step_seconds[-8:]:
+        recent = self.step_seconds[-RECENT:]
+        # From the middle, because what comes first is often at hand and took next to nothing.
+        average = sorted(recent)[len(recent) // 2]
+        for seconds in recent:
             average += 0.4 * (min(seconds, 4 * average + 1e-6) - average)
         return average <= left + INSTANT
 

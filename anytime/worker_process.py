@@ -26,7 +26,7 @@ from anytime.errors import AnytimeError
 from anytime.mail import ClosedError, Mailbox
 from anytime.modules import Module
 from anytime.results import Fault
-from anytime.running import Run, perform
+from anytime.running import RECENT, Run, perform
 from anytime.worker_letters import (
     BEGUN,
     DONE,
@@ -81,7 +81,7 @@ class _PostingRun(Run):
     def check(self) -> None:
         super().check()
         self._due = True
-        del self.step_seconds[:-8]
+        del self.step_seconds[:-RECENT]
 
     def record(self, value: Any) -> None:
         super().record(value)

@@ -18,6 +18,7 @@ from anytime.clocks import INSTANT
 from anytime.joins import Best
 from anytime.profiles import Profile, Recording
 from anytime.programs import Join, Program, upstream
+from anytime.running import RECENT
 from anytime.sampling import CHANGES
 from anytime.strata import stratum_weights
 from compiler.executing import unwanted
@@ -235,8 +236,9 @@ def _averaged(now: Floats, seconds: Floats, counts: Indices, budget: float) -> I
     steps = np.diff(at, axis=1, prepend=now[:, None])
     may = np.ones(seconds.shape, dtype=bool)
     for done in range(1, seconds.shape[1]):
-        average = steps[:, 0].copy()
-        for step in steps[:, max(0, done - 8) : done].T:
+        recent = steps[:, max(0, done - RECENT) : done]
+        average = np.sort(recent, axis=1)[:, recent.shape[1] // 2]
+        for step in recent.T:
             average += 0.4 * (np.minimum(step, 4 * average + 1e-6) - average)
         # Of a long run not every result is recorded, so that its steps are not known.
         may[:, done] = (at[:, done - 1] + average <= budget + 1e-9) | (counts >= CHANGES)

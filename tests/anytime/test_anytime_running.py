@@ -613,3 +613,18 @@ def test_an_error_that_cannot_say_what_it_is_is_a_fault_all_the_same():
 def test_a_deadline_is_an_instant_and_no_number():
     with pytest.raises(AnytimeError, match=r"deadline is 0\.1; give Deadline\.after"):
         anytime.run(count, deadline=0.1)
+
+
+def test_a_first_result_that_was_at_hand_makes_no_later_step_look_cheap():
+    @anytime.module(name="search")
+    def prepared():
+        anytime.charge(0)
+        yield "at hand"
+        for step in range(20):
+            anytime.charge(4)
+            yield step
+
+    for seconds in range(10, 60):
+        result = on_work_clock(prepared, seconds=float(seconds))
+        assert result.overrun == 0
+        assert result.value == seconds // 4 - 1
