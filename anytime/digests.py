@@ -4,30 +4,48 @@ from __future__ import annotations
 
 import hashlib
 import pickle
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 def digest_of(*values: Any) -> str:
-    """A digest of values in their order: arrays by type, shape and content, the rest as pickled.
+    """A digest of values in their order: arrays by type, shape and content, what is in lists,
+    tuples, sets and dicts likewise, the rest as pickled.
 
     Raises TypeError for what cannot be pickled.
     """
-    digest = hashlib.blake2b(digest_size=8)
-    for value in values:
-        array = np.asarray(value) if isinstance(value, np.ndarray | np.generic) else None
-        if array is not None and array.dtype != object:
-            content = array.dtype.str.encode() + repr(array.shape).encode()
-            content += np.ascontiguousarray(array).tobytes()
-        else:
-            content = _pickled(value)
-        digest.update(len(content).to_bytes(8, "little") + content)
-    return digest.hexdigest()
+    return hashlib.blake2b(_joined(map(_content, values)), digest_size=8).hexdigest()
 
 
-def _pickled(value: Any) -> bytes:
+def _content(value: Any) -> bytes:
+    """What a value holds, as bytes that equal values share."""
+    kind = type(value).__qualname__.encode()
+    if isinstance(value, np.ma.MaskedArray):
+        masked = cast("np.ma.MaskedArray[Any, Any]", value)
+        return _joined([kind, _array(np.ma.getdata(masked)), _array(np.ma.getmaskarray(masked))])
+    if isinstance(value, np.ndarray | np.generic) and not value.dtype.hasobject:
+        return _array(np.asarray(cast("NDArray[Any]", value)))
+    if isinstance(value, dict):
+        pairs = cast("dict[Any, Any]", value).items()
+        return _joined([kind, *sorted(_joined(map(_content, pair)) for pair in pairs)])
+    if isinstance(value, set | frozenset):
+        return _joined([kind, *sorted(map(_content, cast("set[Any]", value)))])
+    if type(value) in (list, tuple):
+        return _joined([kind, *map(_content, cast("list[Any]", value))])
     try:
         return pickle.dumps(value, protocol=5)
     except Exception as error:  # whatever the value's own methods raise
         raise TypeError(f"{type(value).__name__} cannot be pickled: {error}") from error
+
+
+def _array(array: NDArray[Any]) -> bytes:
+    about = f"{array.dtype.descr} {array.shape}"
+    return _joined([about.encode(), np.ascontiguousarray(array).tobytes()])
+
+
+def _joined(parts: Iterable[bytes]) -> bytes:
+    """The parts one after the other, so that others never look the same."""
+    return b"".join(len(part).to_bytes(8, "little") + part for part in parts)

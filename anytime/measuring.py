@@ -267,6 +267,9 @@ def problem_keys(program: Program, problems: Sequence[Any], told_apart: bool = F
 
 
 def _digest(program: Program, problem: Any) -> str:
-    others = {k: v for k, v in getattr(problem, "__dict__", {}).items() if k not in program.inputs}
+    slots = [getattr(kind, "__slots__", ()) for kind in type(problem).__mro__]
+    names = {*getattr(problem, "__dict__", ()), *getattr(problem, "_fields", ())}
+    names.update(*((each,) if isinstance(each, str) else each for each in slots))
+    others = sorted(name for name in names - {*program.inputs} if hasattr(problem, name))
     inputs = [getattr(problem, name) for name in program.inputs]
-    return digest_of(*inputs, *(part for name in sorted(others) for part in (name, others[name])))
+    return digest_of(*inputs, *(part for name in others for part in (name, getattr(problem, name))))

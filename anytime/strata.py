@@ -80,7 +80,7 @@ def _among(points: Floats, target: Floats, there: Mask) -> Floats:
 
 
 def _corners(points: Floats, there: Mask) -> NDArray[np.intp]:
-    """The place of the first point that is equal to each, [n, R]: one corner, whose weight they
+    """The place of one of the points that are equal to each, [n, R]: the corner, whose weight they
     share."""
     runs = np.arange(points.shape[1])
     # Powers of π are independent of each other: sums of qualities times them are equal for equal

@@ -21,7 +21,7 @@ from compiler.guarding import Steps
 
 WEIGHT = 0.2  # of the newest run in a module's running ratio
 WILDEST = 4.0  # times as long, or as short, as one run may claim that its steps take
-FORGOTTEN = 0.01  # of what is known of the pace, at each call in which nothing could be run
+FORGOTTEN = 0.01  # of what is known of the pace, of a module, at each call in which it is not run
 DRIFT = 1.1  # by which a ratio must have changed before time is divided anew
 
 
@@ -76,13 +76,15 @@ class Activity:
         result = self._program.run(
             seconds, clock=self._clock, rng=self._rng, memory=self._memory, **inputs
         )
-        for call in self._program.program.calls:
+        calls = self._program.program.calls
+        for call in calls:
             part = result.parts.get(call.label)
             if part is not None:
                 self._observe(call.module, part)
-        if not result.parts:  # what is taken for too slow to be run is not seen to recover
-            for name in self._logs:
-                self._logs[name] *= 1.0 - FORGOTTEN
+        ran = {call.module.name for call in calls if call.label in result.parts}
+        for name in self._modules.keys() - ran:
+            # What is taken for too slow to be run is not seen to recover.
+            self._logs[name] *= 1.0 - FORGOTTEN
         self._divide()
         return result
 

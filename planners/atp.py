@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
+from anytime.errors import AnytimeError
 from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
@@ -59,12 +60,13 @@ def steps(
     one without a plan found none better. Work is counted in nodes taken from an open list, with
     1/16 for every other cell or word touched and 1/256 for every cell summed.
 
-    Raises AnytimeError if start or goal is outside the domain or certainly blocked. A last plan
+    Raises AnytimeError if start or goal is outside the domain or certainly blocked, and when it
+    goes on after the map has changed. A last plan
     without any cell, of infinite length, says that no way exists.
     """
     grid = domain if isinstance(domain, Grid) else Grid(domain)
     first, last, diagonals = endpoints(grid, start, goal, connectivity)
-    run = _borrow(grid.shape)
+    run, changes = _borrow(grid.shape), grid.changes
     try:
         query = _Query(grid, first, last, diagonals, run)
         best, proven = math.inf, False
@@ -74,6 +76,8 @@ def steps(
                 plan, proven = query.plan(), query.done
                 best = query.cost
             yield Step(work, plan)
+            if grid.changes != changes:
+                raise AnytimeError("the map has changed while a plan was made; plan anew")
         if math.isinf(best):
             yield Step(0.0, NO_WAY)
     finally:
@@ -135,7 +139,7 @@ class _Query:
                 return
             yield from self.learn()
             left = _WINDOW_SHARE * self.coarse
-            for length in _WINDOWS:
+            for length in () if math.isinf(self.cost) else _WINDOWS:
                 for work in self.windows(length):
                     yield work
                     left -= work
@@ -190,6 +194,8 @@ class _Query:
                     improving.reweigh(self.grid.shape[1], self.goal, run)
                 yield float(taken)
         if done == OUT_OF_BUDGET:
+            if state[MEETING] >= 0:
+                self.cost = int(way_in_hand.take_up(*self._map, self.start, self.diagonals, run))
             return
         if state[MEETING] >= 0:
             self.cost = int(way_in_hand.take_up(*self._map, self.start, self.diagonals, run))
@@ -205,13 +211,13 @@ class _Query:
 
     def over_known_regions(self) -> Iterator[float]:
         """A first way by what earlier queries have found out about distances, if they have."""
-        grid, run = self.grid, self.run
+        grid, path, before = self.grid, self.run.path, self._in_hand()
         count, cost, work = known_way(
             *self._soft, self.start, self.goal, self.diagonals, grid.regions,
-            grid.landmarks.tables, run.path,
+            grid.landmarks.tables, path,
         )  # fmt: skip
         if count:
-            run.state[COUNT], self.cost = count, int(cost)
+            self._choose(int(count), int(cost), before)
             yield work / blocks.EXPANDED
 
     def over_regions(self) -> Iterator[float]:
@@ -247,20 +253,26 @@ class _Query:
             )
         finally:
             _region_runs[grid.shape].append(run)
-        path, state = self.run.path, self.run.state
-        before = path[: state[COUNT]].copy()
+        path, before = self.run.path, self._in_hand()
         count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, path)
-        cost = int(way_cost(*self._map, path, 0, count - 1))
-        if cost < self.cost:
-            state[COUNT], self.cost = count, cost
-        else:
-            path[: len(before)] = before
+        self._choose(int(count), int(way_cost(*self._map, path, 0, count - 1)), before)
         yield (work + (touched + more) * blocks.TOUCHED) / blocks.EXPANDED
 
     def learn(self) -> Iterator[float]:
         """Find out about distances for later queries."""
         for work in self.grid.landmarks.grow(self._soft, self.start, self.grid.regions):
             yield work / blocks.EXPANDED
+
+    def _in_hand(self) -> NDArray[np.int32]:
+        """A copy of the way in hand, whose place another is written into."""
+        return self.run.path[: self.run.state[COUNT]].copy()
+
+    def _choose(self, count: int, cost: int, before: NDArray[np.int32]) -> None:
+        """Keep the way of so many cells that was written, or the one before if it is no dearer."""
+        if cost < self.cost:
+            self.run.state[COUNT], self.cost = count, cost
+        else:
+            self.run.path[: len(before)] = before
 
     def windows(self, length: int) -> Iterator[float]:
         """Make the way optimal in windows of that many cells, one after the other."""

@@ -71,6 +71,7 @@ class Grid:
         self.cost = cost
         self.wall = wall
         self.shape: tuple[int, int] = (shape[0], shape[1])
+        self.changes = 0  # so many updates
 
     @property
     def dearest(self) -> int:
@@ -122,6 +123,7 @@ class Grid:
         )
         forget(self.regions, columns, top, left, top + height, left + width)
         self.__dict__.pop("landmarks", None)
+        self.changes += 1
 
     def __repr__(self) -> str:
         seen = int((self.regions.count != 255).sum())

@@ -237,7 +237,8 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
                 continue
             label[there], came[there] = base - new_g, side
             number = (new_g + h) >> shift
-            if known and not old & 1 and (base - old + h) >> shift == number:
+            old_f = base - old + h  # beyond the upper end its entry may have been passed over
+            if known and not old & 1 and old_f < upper and old_f >> shift == number:
                 continue
             if unused >= 0:
                 place, unused = unused, np.int64(behind[unused])

@@ -33,7 +33,7 @@ from planners.region_search import (
 from planners.search import OUT_OF_BUDGET, SPAN
 from planners.tracing import connect, pins_along
 
-CALLED = "144b9d3ed106"
+CALLED = "d0ea06d99500"
 
 _EVERYWHERE = -2  # the goal's region of a search that goes on until it has been everywhere
 _GRAIN = 1000 * EXPANDED  # work of such a search between two steps …
@@ -82,9 +82,12 @@ class Landmarks:
         if not self._asked or region < 0:
             self._asked = True  # who asks about a map twice will ask again
             return
-        if self.tables.made[0] == MARKS or not self._search:
+        if self.tables.made[0] == MARKS:
             return
-        run = self._search.pop() or new_region_run(*self._shape)
+        try:
+            run = self._search.pop() or new_region_run(*self._shape)
+        except IndexError:
+            return
         try:
             if self.tables is _NONE:
                 self.tables = _tables(regions.count.size * MOST)

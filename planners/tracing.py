@@ -110,7 +110,8 @@ def _draw_taut(columns, pins, bends, way, diagonals, regions):
                 join, stride, first = (mask >> LAST_BIT) & FIRST_COLUMN & other, SIDE, SIDE - 1
             # What stands within the two blocks may make one cell a longer way than another.
             other_top = top - SIDE if side == -across else top + SIDE if side == across else top
-            other_left = left - SIDE if side == -1 else left + SIDE if side == 1 else left
+            # A map of one block across has its blocks above each other, one apart.
+            other_left = left if abs(side) == across else left + side * SIDE
             from_cell = (before_row - other_top) * SIDE + before_column - other_left
             to_cell = min(max(after_row - top, 0), SIDE - 1) * SIDE
             to_cell += min(max(after_column - left, 0), SIDE - 1)

@@ -16,7 +16,7 @@ from planners.improving import (
     search,
 )
 
-CALLED = "6a9c016c5e17"
+CALLED = "eefc6de8b633"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
@@ -29,9 +29,9 @@ def so_far(cost, wall, columns, start, diagonals, run):
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
     if count == 0 or node == run.path[count - 1]:
         return beginning
-    rest = 0
+    rest = count - 1  # its last visit, should the way go in a circle
     while run.path[rest] != node:
-        rest += 1
+        rest -= 1
     way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
     for place in range(rest + 1, count):
         way[beginning.size + place - rest - 1] = run.path[place]
@@ -44,11 +44,12 @@ def take_up(cost, wall, columns, start, diagonals, run):
 
     Returns the cost of the new way.
     """
-    node, count, rest = run.state[MEETING], run.state[COUNT], 0
+    node, count = run.state[MEETING], run.state[COUNT]
+    rest = count - 1
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
     run.state[MEETING] = NOTHING
-    while rest < count and run.path[rest] != node:
-        rest += 1
+    while rest > 0 and run.path[rest] != node:
+        rest -= 1
     _replace(run, 0, min(rest, count - 1), beginning)
     return way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
 

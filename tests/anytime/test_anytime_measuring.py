@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -534,3 +534,21 @@ def test_a_clock_is_made_for_each_run_and_not_given():
     clock = WorkClock(MACHINE)
     with pytest.raises(AnytimeError, match="give what makes a run's clock"):
         anytime.measure(look, [SimpleNamespace(scene=Scene(0.5))], seconds=1, clock=clock)
+
+
+@dataclass(slots=True)
+class Slotted:
+    scene: float
+    truth: float
+
+
+class Tupled(NamedTuple):
+    scene: float
+    truth: float
+
+
+@pytest.mark.parametrize("kind", [Slotted, Tupled, Problem])
+def test_whatever_holds_a_problem_all_of_it_counts(kind):
+    program = anytime.programs.program_of(see if kind is Problem else look)
+    keys = {problem_keys(program, [kind(0.5, truth)])[0] for truth in (0.1, 0.2, 0.3)}
+    assert len(keys) == 3

@@ -23,7 +23,23 @@ KINDS = {
     "clustered": lambda shape, rng: clustered(shape, 0.3, rng),
     "rooms": rooms,
     "maze": lambda shape, rng: maze(shape, rng, corridor=2),
+    "squares": lambda shape, rng: squares(shape, rng),
+    "combs": lambda shape, rng: combs(shape, rng),
 }
+
+
+def squares(shape, rng):
+    """A floor of large squares, on which a short query goes beyond its first, small search."""
+    side = int(rng.integers(4, 14))
+    coarse = rng.random((shape[0] // side + 1, shape[1] // side + 1)) > rng.uniform(0.1, 0.6)
+    return np.kron(coarse, np.ones((side, side)))[: shape[0], : shape[1]] > 0
+
+
+def combs(shape, rng):
+    """A floor of combs, on which ways over regions visit cells twice."""
+    side, free = int(rng.integers(2, 7)), np.ones(shape, bool)
+    free[::side] = free[:, ::side] = False
+    return free | (rng.random(shape) < rng.uniform(0.2, 0.4))
 
 
 @st.composite
@@ -234,6 +250,61 @@ def test_mistakes_are_named():
         grid.update(0, 0, np.full((2, 2), 0.5, np.float32))
     with pytest.raises(AnytimeError, match="free holds 255: give bools"):
         Grid.known(np.full((9, 9), 255, np.uint8))
+
+
+@given(st.integers(0, 2**32), st.integers(80, 200), st.integers(1, 9), st.booleans())
+@settings(max_examples=60)
+def test_corridors_of_one_block_across_are_planned_on_either_way(seed, length, width, upright):
+    rng = np.random.default_rng(seed)
+    free = rng.random((length, width)) > rng.uniform(0.05, 0.4)
+    free = free if upright else np.ascontiguousarray(free.T)
+    free[0, 0] = free[-1, -1] = True
+    start, goal = (0, 0), (free.shape[0] - 1, free.shape[1] - 1)
+    best, last = astar(free, start, goal), plans_of(steps(Grid.known(free), start, goal))[-1]
+    assert last.length == (math.inf if best is None else pytest.approx(best.length, rel=1e-4))
+
+
+def small_search_left():
+    rng = np.random.default_rng(748)
+    side = int(rng.integers(4, 14))
+    rows, columns = int(rng.integers(70, 120)), int(rng.integers(70, 120))
+    coarse = rng.random((rows // side + 1, columns // side + 1)) > rng.uniform(0.1, 0.6)
+    return np.kron(coarse, np.ones((side, side)))[:rows, :columns] > 0
+
+
+@pytest.mark.parametrize(
+    ("free", "start", "goal", "connectivity"),
+    [
+        (small_search_left(), (45, 74), (98, 25), 8),
+        (np.random.default_rng(47956).random((16, 32)) > 0.3, (0, 0), (15, 31), 8),
+        (combs((96, 96), np.random.default_rng(2607)), (1, 1), (90, 94), 4),
+    ],
+    ids=["a small search that was not done", "a bucket passed over", "a way in a circle"],
+)
+def test_what_is_called_optimal_is(free, start, goal, connectivity):
+    free[start] = free[goal] = True
+    plans = plans_of(steps(Grid.known(free), start, goal, connectivity=connectivity))
+    assert is_a_way(free, plans[-1], start, goal, connectivity)
+    assert plans[-1].length == pytest.approx(astar(free, start, goal, connectivity).length)
+    assert plans[-1].estimate == 1.0
+
+
+def test_a_wall_that_is_certain_is_no_way_on_a_map_of_probabilities_either():
+    free = np.ones((140, 140), bool)
+    free[64:72] = False
+    last = plans_of(steps(1.0 - free, (0, 0), (139, 139)))[-1]
+    assert math.isinf(last.length)
+
+
+def test_a_plan_on_a_map_that_has_changed_is_refused():
+    free, start, goal = instance("rooms", 256, 0)
+    grid = Grid.known(free)
+    planning = steps(grid, start, goal)
+    next(planning)
+    grid.update(100, 100, np.ones((1, 1)))
+    with pytest.raises(AnytimeError, match="the map has changed while a plan was made; plan anew"):
+        list(planning)
+    assert plans_of(steps(grid, start, goal))
 
 
 def fingerprint(size):

@@ -1,0 +1,58 @@
+"""Digests: equal values have equal ones in every process, others another."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from anytime.digests import digest_of
+
+WORDS = {"north", "south", "east", "west"}
+
+
+def test_a_digest_is_the_same_in_a_process_that_hashes_otherwise():
+    program = f"from anytime.digests import digest_of; print(digest_of({WORDS!r}, dict(a=1, b=2)))"
+    for seed in ("1", "2"):
+        told = subprocess.run(
+            [sys.executable, "-c", program],
+            env={"PYTHONHASHSEED": seed, "PYTHONPATH": ":".join(sys.path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert told.stdout.strip() == digest_of(WORDS, {"b": 2, "a": 1})
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (["ab", "ab"], ["ab", "".join(["a", "b"])]),
+        (np.asfortranarray(np.eye(3)), np.eye(3)),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
+    ],
+)
+def test_equal_values_have_equal_digests(one, other):
+    assert digest_of(one) == digest_of(other)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (np.zeros((2, 8)), np.zeros((4, 4))),
+        (np.zeros(4), np.zeros(4, np.float32)),
+        (["ab", "c"], ["a", "bc"]),
+        ([[1], 2], [1, [2]]),
+        ((1, 2), [1, 2]),
+        (np.ma.array([1, 2], mask=[0, 1]), np.ma.array([1, 2], mask=[1, 0])),
+        (np.array([object]), np.array([int])),
+    ],
+)
+def test_other_values_have_other_digests(one, other):
+    assert digest_of(one) != digest_of(other)
+    assert digest_of(one, other) != digest_of(other, one)
+
+
+def test_what_cannot_be_pickled_is_named():
+    with pytest.raises(TypeError, match="function cannot be pickled"):
+        digest_of(lambda: None)
