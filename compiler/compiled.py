@@ -327,7 +327,8 @@ class CompiledProgram:
         budgets: seconds; six from the least to that beyond which nothing is gained by default.
         Raises AnytimeError for less than two problems or one without a needed attribute.
         """
-        return validate(self, problems, budgets=budgets or self._budgets(), clock=clock, seed=seed)
+        asked = self._budgets() if budgets is None or not len(budgets) else budgets
+        return validate(self, problems, budgets=asked, clock=clock, seed=seed)
 
     def calibrated(
         self,

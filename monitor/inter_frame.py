@@ -68,9 +68,8 @@ def pinned_contracts(program: CompiledProgram, extreme: str) -> Contracts:
             pinned[place] = table.first if extreme == "min" else table.saturation
         useful = _useful(tables[timed[-1]])
         count = min(max(CONTRACTS // len(settings), 1), len(useful))
-        for seconds in useful[
-            np.unique(np.linspace(0, len(useful) - 1, count).round().astype(int))
-        ]:
+        chosen = np.unique(np.linspace(0, len(useful) - 1, count).round().astype(int))
+        for seconds in useful[chosen]:
             rows.append(pinned.copy())
             rows[-1][timed[-1]] = seconds
     return _contracts(program, np.array(rows))

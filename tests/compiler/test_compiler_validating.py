@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -135,3 +136,25 @@ def test_promises_can_be_calibrated_by_running():
     for seconds in np.linspace(found.least, 0.2, 9):
         low, high = found.interval(seconds)
         assert low <= found.promise(seconds) <= high
+
+
+@pytest.mark.parametrize("wrong", [7.0, float("nan")])
+def test_a_score_that_is_none_is_refused_as_when_measuring(wrong):
+    @anytime.module(
+        quality=lambda value, scene: wrong if scene.name == "odd" else value, name="see"
+    )
+    def scored_oddly(x):
+        anytime.charge(1)
+        yield x
+
+    def problem(name):
+        return SimpleNamespace(name=name, x=0.5)
+
+    library = anytime.measure(
+        scored_oddly, [problem("a"), problem("b")], seconds=1.0, clock=lambda: WorkClock(MACHINE)
+    )
+    compiled = compiler.compile(scored_oddly, library)
+    asked = {"budgets": np.array([0.01, 0.02]), "clock": lambda: WorkClock(MACHINE)}
+    assert len(compiled.validate([problem("c"), problem("d")], **asked).rows) == 2
+    with pytest.raises(AnytimeError, match=r"of 'see' is .* on problem"):
+        compiled.validate([problem("c"), problem("odd")], **asked)
