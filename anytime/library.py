@@ -128,6 +128,8 @@ class _Run(Stored):
     estimates: list[float] | None
     end: tuple[float, float]
     complete: bool
+    results: int = 0
+    steps: int = 0
 
 
 class _Profile(Stored):
@@ -170,6 +172,8 @@ def _store(profile: Profile) -> _Profile:
             estimates=None if np.isnan(run.estimates).any() else run.estimates.tolist(),
             end=run.end,
             complete=run.complete,
+            results=run.results,
+            steps=run.steps,
         )
         for run in sorted(
             profile.recordings, key=lambda run: (run.problem, run.call, sorted(run.inputs.items()))
@@ -208,6 +212,8 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     for name, column in (("seconds", run.seconds), ("work", run.work)):
         if any(b < a for a, b in pairwise(column)) or (column and column[0] < 0):
             raise refuse(f"{name} must not decrease or be negative")
+    if min(run.results, run.steps) < 0 or 0 < run.results < count:
+        raise refuse(f"has {count} results, and says {run.results} in {run.steps} steps are all")
     if min(run.end) < 0:
         raise refuse("the end of a run cannot be negative")
     if profile.references:
@@ -232,6 +238,8 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
         np.full(count, np.nan) if run.estimates is None else np.array(run.estimates, dtype=float),
         run.end,
         run.complete,
+        run.results,
+        run.steps,
     )
 
 

@@ -62,6 +62,8 @@ class _Row(Stored):
     estimates: list[float | None]
     end: tuple[float, float]
     complete: bool
+    results: int = 0
+    steps: int = 0
 
 
 class _Line(Stored):
@@ -120,6 +122,8 @@ def _row(run: Recording) -> _Row:
         estimates=[None if np.isnan(value) else float(value) for value in run.estimates],
         end=run.end,
         complete=run.complete,
+        results=run.results,
+        steps=run.steps,
     )
 
 
@@ -147,4 +151,6 @@ def _recording(problem: str, label: str, row: _Row) -> Recording:
         np.array([np.nan if value is None else value for value in row.estimates], dtype=float),
         row.end,
         row.complete,
+        row.results,
+        row.steps,
     )

@@ -28,6 +28,8 @@ class Recording:
         raw is the quality, or the cost for a module with a cost; estimates are NaN for a module
         without one.
     end: seconds, work when the run ended.
+    results: registrations in all, of which some are left out here; by default none is.
+    steps: check-points in all, at which it can be ended; by default one for each result.
     """
 
     problem: str
@@ -40,8 +42,12 @@ class Recording:
     estimates: Floats
     end: tuple[float, float]
     complete: bool
+    results: int = 0
+    steps: int = 0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "results", self.results or len(self.seconds))
+        object.__setattr__(self, "steps", self.steps or self.results)
         # The same steps added in another order differ in the last bit, and are the same moment.
         object.__setattr__(self, "seconds", np.round(self.seconds, DECIMALS))
         object.__setattr__(self, "end", (round(float(self.end[0]), DECIMALS), float(self.end[1])))

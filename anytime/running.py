@@ -49,7 +49,7 @@ class Run:
         self.mixed = False
         self.cut = False
         self._observe = observe
-        self._steps = 0
+        self.steps = 0
         self._still = 0
         self._last_step = self.started
         self._closed = False
@@ -61,7 +61,7 @@ class Run:
             raise AnytimeError(
                 f"module {self.module.name!r} charged {work}; give a finite number >= 0"
             )
-        self.mixed = self.mixed or (self._steps > 0 and not self.charges)
+        self.mixed = self.mixed or (self.steps > 0 and not self.charges)
         self.charges = True
         self.work += float(work)
         self.deadline.clock.spend(self.module.name, work, None)
@@ -71,7 +71,7 @@ class Run:
         self._open()
         if not self.charges:
             self.work += 1
-            self.deadline.clock.spend(self.module.name, 1.0, self._steps)
+            self.deadline.clock.spend(self.module.name, 1.0, self.steps)
         now = self.deadline.clock.now()
         self._still = self._still + 1 if now == self._last_step else 0
         if self._still > STILL:
@@ -81,7 +81,7 @@ class Run:
             )
         self.step_seconds.append(now - self._last_step)
         self._last_step = now
-        self._steps += 1
+        self.steps += 1
 
     def record(self, value: Any) -> None:
         """Keep a result; it replaces the last."""
@@ -105,7 +105,7 @@ class Run:
         self.work += sum(charges) if self.charges else 1.0
         self.step_seconds.append(at - self._last_step)
         self._last_step = at
-        self._steps += 1
+        self.steps += 1
 
     @property
     def observed(self) -> bool:

@@ -303,4 +303,6 @@ def _recording(call: Call, key: str, sample: _Sample, inputs: Mapping[str, float
         np.array([np.nan if c.estimate is None else c.estimate for c in changes]),
         (sample.result.elapsed, sample.result.work),
         bool(sample.result.status.name == "COMPLETE"),
+        max(len(changes), len(sample.run.history)),  # changes of a contract are of several runs
+        sample.run.steps,
     )

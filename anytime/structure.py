@@ -56,6 +56,30 @@ def only_for(program: Program, join: Join) -> tuple[frozenset[str], ...]:
     )
 
 
+def _parallels(program: Program) -> list[Group]:
+    """A parallel whose results go to several arms of a later one is over when that begins."""
+    by_label = {node.label: node for node in program.nodes}
+    found: list[Group] = []
+    over: list[frozenset[str]] = []  # of each, all that is behind its results
+    for count, parallel in enumerate(program.parallels, start=1):
+        results = tuple(by_label[label] for label in parallel.labels)
+        arms = [_private(program, place, results, None) for place in range(len(results))]
+        for earlier, before in zip(found, over, strict=True):
+            if sum(bool(arm & earlier.calls) for arm in arms) > 1:
+                arms = [arm - before for arm in arms]
+        found.append(Group(f"parallel {count}", tuple(arms), parallel.processors))
+        over.append(frozenset(node.label for result in results for node in behind(result)))
+    return found
+
+
+def within(program: Program, group: Group) -> frozenset[Node]:
+    """The calls of a group, and the joins between them: what their results are joined to for
+    others of its calls."""
+    calls = frozenset(node for node in program.nodes if node.label in group.calls)
+    above = frozenset().union(*(behind(call) for call in calls))
+    return frozenset(node for node in above if behind(node) & calls)
+
+
 def groups(program: Program) -> tuple[Group, ...]:
     """The branches and parallels of a program, from the outermost in.
 
@@ -67,11 +91,7 @@ def groups(program: Program) -> tuple[Group, ...]:
             arms = only_for(program, node)[len(node.rule.tests) :]
             if all(arms):
                 found.append(Group(node.label, arms, 0))
-    by_label = {node.label: node for node in program.nodes}
-    for count, parallel in enumerate(program.parallels, start=1):
-        arguments = tuple(by_label[label] for label in parallel.labels)
-        arms = tuple(_private(program, place, arguments, None) for place in range(len(arguments)))
-        found.append(Group(f"parallel {count}", arms, parallel.processors))
+    found += _parallels(program)
     found.sort(key=lambda group: -len(group.calls))
     for place, inner in enumerate(found):
         for outer in found[:place]:
@@ -82,6 +102,15 @@ def groups(program: Program) -> tuple[Group, ...]:
                     "and neither is within one arm of the other; use all results of a parallel "
                     "in the same arm of a branch"
                 )
+    return tuple(found)
+
+
+def outermost(program: Program) -> tuple[Group, ...]:
+    """The parallels of a program that stand in no other parallel."""
+    found: list[Group] = []
+    for group in groups(program):
+        if group.processors and not any(group.calls <= other.calls for other in found):
+            found.append(group)
     return tuple(found)
 
 
@@ -108,6 +137,12 @@ def paths(program: Program) -> dict[str, tuple[Arm, ...]]:
             for label in arm:
                 found[label] += (Arm(group.label, index, group.processors),)
     return found
+
+
+def apart(one: Sequence[Arm], other: Sequence[Arm]) -> bool:
+    """Whether two calls with these paths are in different arms of one group."""
+    arms = {arm.group: arm.index for arm in other}
+    return any(arms.get(arm.group, arm.index) != arm.index for arm in one)
 
 
 def due(program: Program) -> dict[str, float]:
@@ -143,10 +178,10 @@ def in_order(
             _after_their_test(program, node, by_label, before)
     for group in groups(program):
         if group.processors:
-            members = {by_label[label] for label in group.calls}
-            needed = {n for member in members for n in before[member]} - members
-            for member in members:
-                before[member] |= needed
+            inside = within(program, group)
+            needed = {n for node in inside for n in before[node]} - inside
+            for label in group.calls:
+                before[by_label[label]] |= needed
     urgency = _urgencies(output)
     left.sort(key=lambda node: urgency.get(node, float("inf")))  # stable: else as they were made
     ordered: list[Node] = []

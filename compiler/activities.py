@@ -163,6 +163,7 @@ def _scaled(program: CompiledProgram, ratios: Mapping[str, float]) -> CompiledPr
             tuple(ratios.get(name, 1.0) * gap for gap in known.median),
             tuple(ratios.get(name, 1.0) * gap for gap in known.p95),
             known.spread,
+            known.whole,
         )
         for name, known in program.steps.items()
     }

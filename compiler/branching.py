@@ -25,8 +25,8 @@ def joined(
     feeds, chances = table.feeds, table.chances[..., 0, :]
     if isinstance(node.rule, Branch):
         feeds, chances = _split(node, table, tables)
-    known = before(after, table.label, feeds)
-    return known, mean(chances, (*feeds, table.label), later, after, known)
+    known = before(after, [table.label], feeds)
+    return known, mean([((*feeds, table.label), chances)], later, after, known)
 
 
 def _split(join: Join, table: Table, tables: Sequence[Table]) -> tuple[tuple[str, ...], Floats]:
@@ -74,29 +74,30 @@ def answered(
         known = [*(_quality(by_label, level, test) for test in tests), 1.0, 1.0]
         odds[(*cell, 0)] = sum(chance for chance, _ in rule.answered(known, True))
         odds[(*cell, 1)] = 1 - odds[(*cell, 0)]
-    known = before(after, name, feeds)
-    return known, mean(odds, (*feeds, name), later, after, known)
+    known = before(after, [name], feeds)
+    return known, mean([((*feeds, name), odds)], later, after, known)
 
 
 def passed_over(
-    table: Table,
+    labels: Sequence[str],
     tables: Sequence[Table],
     by: str,
     idle: float,
     state: tuple[str, ...],
     value: Floats,
-    moments: NDArray[np.int16],
+    chosen: NDArray[np.int16],
     after: tuple[str, ...],
     later: Floats,
 ) -> tuple[tuple[str, ...], Floats, NDArray[np.int16]]:
-    """In states in which a call is not run, the value is that after it, without its result."""
-    without = np.take(later, 0, axis=after.index(table.label))
-    names = tuple(name for name in after if name != table.label)
+    """In states in which nodes are not run, the value is that after them, without their results."""
+    none = tuple(0 if name in labels else slice(None) for name in after)
+    without = later[none]
+    names = tuple(name for name in after if name not in labels)
     if by not in state:
         size = 2 if by.endswith("?") else next(len(t.levels) for t in tables if t.label == by)
         state = (by, *state)
         value = np.broadcast_to(value, (size, *value.shape)).copy()
-        moments = np.broadcast_to(moments, (size, *moments.shape)).copy()
+        chosen = np.broadcast_to(chosen, (size, *chosen.shape)).copy()
     axis = state.index(by)
     size = value.shape[axis]
     if by.endswith("?"):
@@ -111,7 +112,7 @@ def passed_over(
     return (
         state,
         np.where(where, np.broadcast_to(view, value.shape), value),
-        np.where(where, np.int16(0), moments),
+        np.where(where, np.int16(0), chosen),
     )
 
 
@@ -154,21 +155,23 @@ def _quality(by_label: Mapping[str, Table], level: Mapping[str, int], node: obje
 
 
 def mean(
-    chances: Floats,
-    names: Sequence[str],
+    factors: Sequence[tuple[Sequence[str], Floats]],
     later: Floats,
     after: Sequence[str],
     before: Sequence[str],
 ) -> Floats:
-    """The values `later` [after, ticks] in the mean over `chances` [names], [before, ticks]."""
-    letter = dict(zip(dict.fromkeys((*names, *after, *before)), string.ascii_letters, strict=False))
-    one, other, made = ("".join(letter[n] for n in axes) for axes in (names, after, before))
+    """The values `later` [after, ticks] in the mean over chances, each [names]; [before, ticks]."""
+    names = dict.fromkeys([*(n for axes, _ in factors for n in axes), *after, *before])
+    letter = dict(zip(names, string.ascii_letters, strict=False))
     tick = string.ascii_letters[len(letter)]
+    ones = ["".join(letter[name] for name in axes) for axes, _ in factors]
+    other, made = ("".join(letter[name] for name in axes) + tick for axes in (after, before))
+    operands = [chances for _, chances in factors]
     return np.asarray(
-        np.einsum(f"{one},{other}{tick}->{made}{tick}", chances, later, optimize=True)
+        np.einsum(",".join([*ones, other]) + f"->{made}", *operands, later, optimize=True)
     )
 
 
-def before(after: tuple[str, ...], made: str, feeds: Sequence[str]) -> tuple[str, ...]:
-    """The state before something is made, from that after it and what it is made from."""
-    return tuple(dict.fromkeys([name for name in after if name != made] + list(feeds)))
+def before(after: tuple[str, ...], made: Sequence[str], feeds: Sequence[str]) -> tuple[str, ...]:
+    """The state before nodes are made, from that after them and what they are made from."""
+    return tuple(dict.fromkeys([name for name in after if name not in made] + list(feeds)))

@@ -25,8 +25,6 @@ RESAMPLED = 8  # budgets at which intervals are found from the tables of some of
 RESAMPLES = 60  # of those tables, at most
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
 DIVIDED = 3  # calls at most of programs that are divided anew for each fold
-LATER = (1.25, 1.5, 2.0)  # times the greatest budget at which its division is tried as well …
-GAINED = 0.02  # … if that gains so much
 KNOTS = 96  # budgets at which promises are calibrated; fewer for many calls
 
 
@@ -88,7 +86,6 @@ def calibrate(
     with more of it, for tables, which are averages over problems, can be mistaken. Isotonic
     regression of the means over the tables' levels gives the promises.
     """
-    frontier = _with_more_time(frontier, replay)
     knots = _knots(frontier, KNOTS * DIVIDED // max(DIVIDED, len(program.calls)))
     values = _unseen(program, profiles, frontier, replay, frontier.budgets[knots], seed)
     standing = _standing(values)
@@ -129,34 +126,6 @@ def calibrate_by_running(
         promised=np.array(worth),
     )
     return calibration.applied(found), calibration
-
-
-def _with_more_time(frontier: Frontier, replay: Replay) -> Frontier:
-    """The frontier with its last division at greater budgets too, where that gains by them.
-
-    A step that is cheaper than those before it is taken for as dear, and is not begun where the
-    tables say that it just fits. Twice the time is enough for one that is no dearer.
-    """
-    last, budget = frontier.shares[-1], float(frontier.budgets[-1])
-
-    def divided(seconds: float) -> list[float]:
-        shares = stretched(replay.tables, last.tolist(), seconds)
-        return [shares.get(table.label, 0.0) for table in replay.tables]
-
-    def lived(seconds: float) -> float:
-        shares = stretched(replay.tables, last.tolist(), seconds)
-        return float(replay.achieved([*shares.values()], seconds).mean())
-
-    if lived(LATER[-1] * budget) <= lived(budget) + GAINED:
-        return frontier
-    # The tables say the same of all of them; promises are told apart by what differs.
-    levels = frontier.promised[-1] + 1e-12 * np.arange(1, len(LATER) + 1)
-    return replace(
-        frontier,
-        budgets=np.append(frontier.budgets, budget * np.array(LATER)),
-        shares=np.vstack([frontier.shares, *(divided(each * budget) for each in LATER)]),
-        promised=np.append(frontier.promised, levels),
-    )
 
 
 def _stretched(
@@ -261,22 +230,44 @@ def _unseen(
     budgets: Floats,
     seed: int,
 ) -> Floats:
-    """Quality achieved on each problem at each budget, [P, budgets], divided without it."""
+    """Quality that may be expected on each problem at each budget, [P, budgets].
+
+    It is achieved with the division that is chosen without the problem's fold. That is one of fewer
+    problems: by what such divisions achieve less, on the problems that they are chosen on, than the
+    frontier's own on all, the promise of that one is more (the optimism of [Efron 1983]).
+    """
     problems = replay.problems
-    fold_of = np.random.default_rng(seed).permutation(len(problems)) % FOLDS
+    folds = min(FOLDS, len(problems))
+    fold_of = np.random.default_rng(seed).permutation(len(problems)) % folds
     every = {problem for profile in profiles.values() for problem in profile.problems}
+    chosen = [frontier] * folds
+    for fold in range(folds):
+        others = every - {problems[row] for row in np.flatnonzero(fold_of == fold)}
+        if others:
+            made = tables(program, profiles, dict.fromkeys(others, 1.0))
+            chosen[fold] = _chosen(made, frontier)
     values = np.zeros((len(problems), len(budgets)))
-    for fold in range(min(FOLDS, len(problems))):
-        held = np.flatnonzero(fold_of == fold)
-        others = dict.fromkeys(every - {problems[row] for row in held}, 1.0)
-        chosen = _chosen(tables(program, profiles, others), frontier) if others else frontier
-        for column, budget in enumerate(budgets):
-            # Where the others say that there is no result yet, all of them had one.
-            source = chosen if chosen.index(budget) >= 0 else frontier
-            row = source.shares[source.index(budget)].tolist()
-            shares = stretched(replay.tables, row, float(budget))
-            values[held, column] = replay.achieved([*shares.values()], float(budget), held)
-    return values
+    for column, budget in enumerate(budgets.tolist()):
+        # Where the others say that there is no result yet, all of them had one.
+        known = [each if each.index(budget) >= 0 else frontier for each in chosen]
+        whole, *lived = _lives(replay, [frontier, *known], budget)
+        there: list[Floats] = []
+        for fold, each in enumerate(lived):
+            values[fold_of == fold, column] = each[fold_of == fold]
+            there.append(each[fold_of != fold])
+        if folds > 1:
+            values[:, column] += whole.mean() - np.concatenate(there).mean()
+    return values.clip(0.0, 1.0)
+
+
+def _lives(replay: Replay, sources: Sequence[Frontier], budget: float) -> list[Floats]:
+    """Quality achieved on each problem with the division of each frontier for a budget, [P]."""
+    rows = [tuple(source.shares[source.index(budget)].tolist()) for source in sources]
+    found = {
+        row: replay.achieved([*stretched(replay.tables, row, budget).values()], budget)
+        for row in dict.fromkeys(rows)
+    }
+    return [found[row] for row in rows]
 
 
 def _standing(values: Floats) -> NDArray[np.bool_]:

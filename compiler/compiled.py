@@ -26,7 +26,7 @@ from compiler.calibrating import Calibration, calibrate_by_running
 from compiler.compiled_profiles import profile_of
 from compiler.costs import stretched
 from compiler.division import Floats, Frontier
-from compiler.executing import Execution, Listener, Memory, planned, status_of, unwanted
+from compiler.executing import Execution, Listener, Memory, Shares, planned, status_of, unwanted
 from compiler.explaining import Explanation, decided, explain
 from compiler.guarding import Steps
 from compiler.objectives import EXPECTED, Objective
@@ -107,7 +107,8 @@ class CompiledProgram:
 
     def allocate(self, seconds: float) -> Allocation:
         """The best division of a budget. Raises AnytimeError for one below the least."""
-        index = self.frontier.index(_finite(seconds))
+        seconds = _finite(seconds)
+        index = self.frontier.index(seconds)
         if index < 0:
             raise AnytimeError(
                 f"{duration(seconds)} is below the least budget of {self.name!r}, "
@@ -194,11 +195,11 @@ class CompiledProgram:
             why = f"{duration(budget)} is below the least budget, {duration(self.least)}"
             return Result(Status.NO_RESULT, None, None, 0.0, max(0.0, -budget), (), why=why)
         allocation = self.allocate(budget)
-        execution = self._execution(allocation.shares, deadline, inputs, rng, on_result)
-        execution.memory = {} if memory is None else memory
-        plan = self._plan(budget)
+        plan, decide = self._plan(budget), None
         if self.policy is not None and plan is not None:
-            execution.decide = partial(self.policy.share, self.program, plan)
+            decide = partial(self.policy.share, self.program, plan)
+        execution = self._execution(allocation.shares, deadline, inputs, rng, on_result, decide)
+        execution.memory = {} if memory is None else memory
         for _ in execution.stages():
             pass
         return self._composed(allocation, execution)
@@ -240,6 +241,7 @@ class CompiledProgram:
         inputs: Mapping[str, Any],
         rng: np.random.Generator | None,
         on_result: Listener | None,
+        decide: Shares | None = None,
     ) -> Execution:
         return Execution(
             self.program,
@@ -249,10 +251,11 @@ class CompiledProgram:
             inputs,
             shares,
             planned(self.tables, shares),
-            unwanted(self.program, self.tables, shares),
+            frozenset() if decide else unwanted(self.program, self.tables, shares),
             thrifty=not self.objective.timeless,
             rng=rng,
             on_result=on_result,
+            decide=decide,
         )
 
     def _composed(self, allocation: Allocation, execution: Execution) -> Result:

@@ -108,13 +108,14 @@ def decided(program: Program, tables: Sequence[Table], policy: Policy, plan: Pla
     first = plan.choices[0]
     if first.state or first.within is None:
         return "  decided while it runs: the share of each call, by what came before"
-    table = next(table for table in tables if table.label == first.call)
-    share = policy.share(program, plan, first.call, plan.budget, {})
+    (call,) = first.calls
+    table = next(table for table in tables if table.label == call)
+    share = policy.share(program, plan, call, plan.budget, {})
     chances = endings(table.chances[0], transitions(table), share.ends).sum(axis=-1)
     there = share.moments[chances > 1e-3].tolist()
     mean = duration(float(chances @ share.moments))
     return (
-        f"  decided while it runs: {first.call} ends after {duration(there[0])} … "
+        f"  decided while it runs: {call} ends after {duration(there[0])} … "
         f"{duration(there[-1])} ({mean} on average) by what it shows"
     )
 

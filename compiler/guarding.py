@@ -7,13 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anytime.clocks import INSTANT
-from anytime.profiles import Profile
+from anytime.profiles import Profile, Recording
 from anytime.running import Run
 
+Floats = NDArray[np.float64]
 USUAL = 0.95  # of the recorded runs have a pace within the spread
 STEPS = 32  # steps whose durations are kept one by one; the last stands for all later ones
+LONGEST = 256  # steps of one recorded run that are looked at
 
 
 @dataclass(frozen=True)
@@ -21,11 +24,13 @@ class Steps:
     """How long each step of a module takes: median and 95th percentile by index, in seconds.
 
     spread: how far nearly every recorded run's pace is from that of the medians, as a logarithm.
+    whole: whether every step ends with a result; else it can be ended between two of them.
     """
 
     median: tuple[float, ...]
     p95: tuple[float, ...]
     spread: float = 0.0
+    whole: bool = True
 
     def pace(self, seconds: Sequence[float]) -> float:
         """How long a run's steps took over how long they usually take; NaN if that is no time."""
@@ -33,22 +38,42 @@ class Steps:
         took, normal = sum(seconds), sum(usual)
         return took / normal if took > 0 and normal > 0 else math.nan
 
+    def next(self, done: int, seconds: Floats) -> Floats:
+        """How long the next step of runs will take of which `done` are over, which took these
+        seconds without the first, [runs]: as usual, at the pace of each run so far. The first step
+        tells nothing of it, for what is made ready there takes its own time, or is at hand. No
+        pace is faster than recorded ones are."""
+        usual = sum(self.median[1:done])
+        pace = seconds / usual if usual > 0 else np.ones_like(seconds)
+        return self.median[done] * np.maximum(pace, math.exp(-self.spread))
+
 
 def steps_of(profile: Profile) -> Steps:
-    """The durations between registrations that a profile recorded."""
+    """The durations between registrations that a profile recorded; where it left some out, they
+    count as evenly spread."""
+    runs = [_durations(run) for run in profile.recordings]
     gaps: list[list[float]] = [[] for _ in range(STEPS)]
-    for run in profile.recordings:
-        for index, gap in enumerate(np.diff(run.seconds, prepend=0.0)):
-            gaps[min(index, STEPS - 1)].append(float(gap))
+    for run in runs:
+        for index, gap in enumerate(run):
+            gaps[min(index, STEPS - 1)].append(gap)
     known = [gap for gap in gaps if gap]
     steps = Steps(
         tuple(float(np.median(gap)) for gap in known),
         tuple(float(np.quantile(gap, 0.95)) for gap in known),
     )
-    runs = (np.diff(run.seconds, prepend=0.0).tolist() for run in profile.recordings)
     paces = [pace for run in runs if not math.isnan(pace := steps.pace(run))]
     spread = float(np.quantile(np.abs(np.log(paces)), USUAL)) if paces else 0.0
-    return replace(steps, spread=spread)
+    # The last step of a run may find that there is nothing left to do.
+    whole = all(run.steps <= run.results + 1 for run in profile.recordings)
+    return replace(steps, spread=spread, whole=whole)
+
+
+def _durations(run: Recording) -> list[float]:
+    """Seconds of each of a run's first steps."""
+    places = np.linspace(1, run.results, len(run.seconds)).round()
+    each = np.arange(1, min(run.results, LONGEST) + 1)
+    ends = np.interp(each, [0, *places], [0.0, *run.seconds])
+    return np.diff(ends, prepend=0.0).tolist()
 
 
 def guard(steps: Steps | None, share_ends: float, hard_end: float) -> Callable[[Run], bool] | None:
@@ -70,6 +95,27 @@ def guard(steps: Steps | None, share_ends: float, hard_end: float) -> Callable[[
         if not run.history:
             return now < hard_end
         return now + known.median[index] <= share_ends + INSTANT
+
+    return may_step
+
+
+def last_guard(steps: Steps | None, ends: float) -> Callable[[Run], bool] | None:
+    """What decides before each step of a generator that nothing follows.
+
+    All that is left is its own, up to the end of its share. Where its step is a recorded one, that
+    tells how long it takes; beyond, and where it can be ended between two results, `Run.may_step`
+    goes by the run's own steps alone.
+    """
+    if steps is None or not steps.median or not steps.whole:
+        return None
+    known = steps
+
+    def may_step(run: Run) -> bool:
+        done = len(run.history)
+        if not 0 < done < min(len(known.median), STEPS - 1):
+            return run.may_step()
+        took = np.array([run.history[-1].seconds - run.history[0].seconds])
+        return run.deadline.clock.now() + float(known.next(done, took)[0]) <= ends + INSTANT
 
     return may_step
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -83,8 +83,8 @@ def _restore(file: Path, stored: StoredSchedule, modules: Sequence[Module]) -> C
         policy=policy,
         calibration=Calibration(*np.array(stored.calibration).T),
         steps={
-            name: Steps(tuple(median), tuple(p95), spread)
-            for name, (median, p95, (spread,)) in stored.steps.items()
+            name: Steps(tuple(known.median), tuple(known.p95), known.spread, known.whole)
+            for name, known in stored.steps.items()
         },
         machine=stored.machine,
         regret=stored.regret,
@@ -308,15 +308,13 @@ def _check_divisions(path: Path, stored: StoredSchedule, made: Sequence[Table]) 
     check_calibration(path, np.array(stored.calibration, dtype=float).reshape(-1, 4))
     if not 0 <= stored.regret <= 1:
         raise AnytimeError(f"{path}: a regret of {stored.regret}; it lies in [0, 1]")
-    for name, rows in stored.steps.items():
+    for name, known in stored.steps.items():
         if (
-            len(rows) != 3
-            or len(rows[0]) != len(rows[1])
-            or len(rows[2]) != 1
-            or min(chain(*rows)) < 0
+            len(known.median) != len(known.p95)
+            or min([*known.median, *known.p95, known.spread]) < 0
         ):
             raise AnytimeError(
-                f"{path}: steps.{name} is not two rows of seconds >= 0 and their spread"
+                f"{path}: steps.{name} has not two equal rows of seconds >= 0 and a spread >= 0"
             )
 
 

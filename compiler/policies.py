@@ -32,18 +32,19 @@ class Within:
 
 @dataclass(frozen=True)
 class Choice:
-    """What one call gets in every state.
+    """What one call, or all calls of a parallel, get in every state.
 
-    state: what the decision looks at, in order: labels of nodes, by their level, and of branches,
-    by what their tests answer. moments: [..., TICKS + 1] the moment at which the call is to end, or
-    where it is watched the last at which it may, by the state and the ticks that are left.
-    seconds: [M] of the moments. within: of a call that is watched.
+    calls: labels of those that begin. state: what the decision looks at, in order: labels of nodes,
+    by their level, and of branches, by what their tests answer. chosen: [..., TICKS + 1] which
+    division, by the state and the ticks that are left; of a call that is watched, the last moment
+    at which it may end. shares: [D, calls] seconds of each division. within: of a call that is
+    watched.
     """
 
-    call: str
+    calls: tuple[str, ...]
     state: tuple[str, ...]
-    moments: NDArray[np.int16]
-    seconds: Floats
+    chosen: NDArray[np.int16]
+    shares: Floats
     within: Within | None = None
 
 
@@ -101,22 +102,24 @@ class Policy:
     def share(
         self, program: Program, plan: Plan, call: str, left: float, known: Mapping[str, Known]
     ) -> Share:
-        """What a call gets when so many seconds are left of the plan's budget.
+        """What a call gets when so many seconds are left of the plan's budget; one of a parallel,
+        when so many are left as that begins.
 
         known: results that are there, by label of their node.
         """
-        choice = next(choice for choice in plan.choices if choice.call == call)
+        choice = next(choice for choice in plan.choices if call in choice.calls)
         tick = plan.budget / TICKS
         ticks = min(TICKS, max(0, math.floor(left / tick + 1e-9))) if tick > 0 else 0
         state = tuple(self._level(program, name, known) for name in choice.state)
-        seconds = float(choice.seconds[choice.moments[(*state, ticks)]])
+        division = choice.chosen[(*state, ticks)]
+        seconds = float(choice.shares[division, choice.calls.index(call)])
         if choice.within is None:
             return Share(seconds)
         levels = self.levels[call]
         inside = tuple(self._level(program, name, known) for name in choice.within.state)
         bits = choice.within.ends[(*inside, slice(None), slice(None), ticks)]
         ends = np.unpackbits(bits, axis=-1, count=len(levels)).astype(np.bool_)
-        return Share(seconds, choice.seconds[: len(ends)], ends, levels, self.seen.get(call))
+        return Share(seconds, choice.shares[: len(ends), 0], ends, levels, self.seen.get(call))
 
     def _level(self, program: Program, name: str, known: Mapping[str, Known]) -> int:
         if name not in self.levels:

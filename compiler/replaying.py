@@ -22,7 +22,7 @@ from anytime.running import RECENT
 from anytime.sampling import CHANGES
 from anytime.strata import stratum_weights
 from compiler.executing import unwanted
-from compiler.guarding import Steps
+from compiler.guarding import STEPS, Steps
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
@@ -106,7 +106,7 @@ class Replay:
             share_end += shares[place]
             last, hard = not firsts, budget - sum(firsts.values())
             if last and call.module.generator and not call.module.contract:
-                count = _averaged(now, seconds, counts, budget)
+                count = _to_the_end(self.steps[call.module.name], now, seconds, counts, budget)
             elif last:
                 count = (now[:, None] + seconds <= budget + 1e-9).sum(axis=1)
             elif call.module.contract:
@@ -229,19 +229,25 @@ def _best(join: Join, delivered: Mapping[str, _Delivered]) -> _Delivered:
     )
 
 
-def _averaged(now: Floats, seconds: Floats, counts: Indices, budget: float) -> Indices:
-    """How many results in time the last call has, which is guarded by the moving average of its
-    own steps (`Run.may_step`)."""
+def _to_the_end(
+    known: Steps, now: Floats, seconds: Floats, counts: Indices, budget: float
+) -> Indices:
+    """How many results in time the last call has, which is guarded by what is known of its steps,
+    and beyond those by the moving average of its own (`compiler.guarding.last_guard`). Where it can
+    be ended between two results it has all that come in time."""
     at = now[:, None] + np.where(np.isfinite(seconds), seconds, 0.0)
     steps = np.diff(at, axis=1, prepend=now[:, None])
     may = np.ones(seconds.shape, dtype=bool)
-    for done in range(1, seconds.shape[1]):
-        recent = steps[:, max(0, done - RECENT) : done]
-        average = np.sort(recent, axis=1)[:, recent.shape[1] // 2]
-        for step in recent.T:
-            average += 0.4 * (np.minimum(step, 4 * average + 1e-6) - average)
+    for done in range(1, seconds.shape[1] if known.whole else 1):
+        if done < min(len(known.median), STEPS - 1):
+            expected = known.next(done, at[:, done - 1] - at[:, 0])
+        else:
+            recent = steps[:, max(0, done - RECENT) : done]
+            expected = np.sort(recent, axis=1)[:, recent.shape[1] // 2]
+            for step in recent.T:
+                expected += 0.4 * (np.minimum(step, 4 * expected + 1e-6) - expected)
         # Of a long run not every result is recorded, so that its steps are not known.
-        may[:, done] = (at[:, done - 1] + average <= budget + 1e-9) | (counts >= CHANGES)
+        may[:, done] = (at[:, done - 1] + expected <= budget + 1e-9) | (counts >= CHANGES)
     in_time = np.logical_and.accumulate(may, axis=1) & (now[:, None] + seconds <= budget + 1e-9)
     return np.where(now <= budget, in_time.sum(axis=1), 0)
 

@@ -11,6 +11,7 @@ from anytime.errors import AnytimeError
 from anytime.joins import Branch
 from anytime.profiles import Profile
 from anytime.programs import Join, Program
+from anytime.structure import outermost, within
 from compiler.objectives import Objective
 from compiler.policies import Seen, label_of
 from compiler.tables import Table, levels_of
@@ -38,13 +39,9 @@ def check(program: Program, seen: Collection[str], objective: Objective) -> None
             f"{objective!r} is no mean, and a policy maximises means; adaptive=True takes "
             "compiler.expected(…) or compiler.at_least(…)"
         )
-    if program.parallels:
-        raise AnytimeError(
-            "adaptive=True decides between calls that follow each other; leave parallel out"
-        )
-    tests = only_asked(program)
+    unseen = {program.output.label} | only_asked(program) | _within(program)
     for call in program.calls:
-        if call is not program.output and call.label not in tests and call.label not in seen:
+        if call.label not in unseen and call.label not in seen:
             raise AnytimeError(
                 f"adaptive=True looks at what {call.label} achieved; give {call.module.name} an "
                 "estimate=…"
@@ -53,15 +50,20 @@ def check(program: Program, seen: Collection[str], objective: Objective) -> None
 
 def watched(program: Program, tables: Sequence[Table], seen: Collection[str]) -> list[Table]:
     """Tables of the calls that show their quality while they run: not of contract modules, whose
-    time is fixed when they begin."""
-    contracts = {call.label for call in program.calls if call.module.contract}
-    return [t for t in tables if t.courses and t.label in seen and t.label not in contracts]
+    time is fixed when they begin, and not in a parallel, which is decided as a whole."""
+    fixed = {call.label for call in program.calls if call.module.contract}
+    fixed |= {label for group in outermost(program) for label in group.calls}
+    return [t for t in tables if t.courses and t.label in seen and t.label not in fixed]
 
 
-def as_seen(program: Program, table: Table) -> Table:
-    """A test's table as the run sees it: not whether it is right, only how often it is."""
-    if table.label not in only_asked(program):
-        return table
+def as_seen(program: Program, tables: Sequence[Table]) -> list[Table]:
+    """The tables as a policy sees them: of a test not whether it is right, only how often it is;
+    but one that is asked within a parallel is not seen at all."""
+    tests = only_asked(program) - _within(program)
+    return [_test(table) if table.label in tests else table for table in tables]
+
+
+def _test(table: Table) -> Table:
     there = table.chances[..., 1:].sum(axis=-1)
     right = np.where(there > 0, table.expected / np.maximum(there, 1e-12), np.nan)
     levels, bins = levels_of(right, 32)
@@ -78,6 +80,18 @@ def as_seen(program: Program, table: Table) -> Table:
         table.first,
         table.path,
     )
+
+
+def _within(program: Program) -> set[str]:
+    """Labels of what only the parallels themselves look at: the policy does not."""
+    found = set[str]()
+    for group in outermost(program):
+        inside = within(program, group)
+        for node in inside:
+            users = {user for user in program.nodes if node in user.arguments}
+            if users <= inside:
+                found.add(node.label)
+    return found
 
 
 def _calibrated(profile: Profile) -> Seen:

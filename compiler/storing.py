@@ -18,7 +18,7 @@ from compiler.objectives import Objective
 from compiler.policies import Policy
 from compiler.tables import Table
 
-SCHEMA = "anytime.schedule/4"
+SCHEMA = "anytime.schedule/5"
 
 
 class StoredArgument(Stored):
@@ -48,6 +48,13 @@ class StoredNode(Stored):
     module: str | None = None
     parameters: list[str] | None = None
     rule: StoredRule | None = None
+
+
+class StoredSteps(Stored):
+    median: list[float]
+    p95: list[float]
+    spread: float
+    whole: bool
 
 
 class StoredParallel(Stored):
@@ -87,7 +94,7 @@ class StoredSchedule(Stored):
     promised: list[float]
     exact: bool
     calibration: list[tuple[float, float, float, float]]
-    steps: dict[str, list[list[float]]]
+    steps: dict[str, StoredSteps]
     regret: float
     seen: dict[str, list[list[float]]] | None
 
@@ -150,7 +157,10 @@ def save(compiled: Compiled, path: Path) -> None:
         exact=frontier.exact,
         calibration=compiled.calibration.rows(),
         steps={
-            name: [list(s.median), list(s.p95), [s.spread]] for name, s in compiled.steps.items()
+            name: StoredSteps(
+                median=list(s.median), p95=list(s.p95), spread=s.spread, whole=s.whole
+            )
+            for name, s in compiled.steps.items()
         },
         regret=compiled.regret,
         seen=seen,

@@ -60,7 +60,9 @@ def sketch(kind: str, rng: np.random.Generator) -> Sketch:
     if kind == "choose":
         return _choose(bool(rng.random() < 0.5))
     if kind == "parallel":
-        return _parallel(int(rng.integers(1, 4)))
+        processors = int(rng.integers(1, 4))
+        shapes = (_parallel, _joined, _nested, _after_each_other)
+        return shapes[int(rng.integers(len(shapes)))](processors)
     if kind == "outputs":
         drawn = rng.integers(2, 16, size=2)
         deadlines = tuple(float(d) if d < 9 else math.inf for d in drawn)
@@ -166,6 +168,63 @@ def _parallel(processors: int) -> Sketch:
             for places in itertools.product(range(processors), repeat=3)
         )
         yield 1.0, quality("merge", *made), seconds["see"] + ends + seconds["merge"]
+
+    return Sketch(say, live)
+
+
+def _joined(processors: int) -> Sketch:
+    """With alternatives within an arm."""
+
+    def say(image: Any) -> Any:
+        seen = see(image)
+        best = compiler.choose(near(seen), far(seen))
+        return merge(*compiler.parallel(last(best), test(image), processors=processors), seen)
+
+    def live(quality: Live, seconds: dict[str, float]) -> Ways:
+        seen = quality("see")
+        found = [q for q in (quality("near", seen), quality("far", seen)) if q is not None]
+        made = quality("last", max(found, default=None)), quality("test")
+        arms = [seconds["near"] + seconds["far"] + seconds["last"], seconds["test"]]
+        ends = sum(arms) if processors == 1 else max(arms)
+        yield 1.0, quality("merge", *made, seen), seconds["see"] + ends + seconds["merge"]
+
+    return Sketch(say, live)
+
+
+def _nested(processors: int) -> Sketch:
+    """With a parallel within an arm."""
+
+    def say(image: Any) -> Any:
+        seen = see(image)
+        inner = compiler.parallel(near(seen), far(image), processors=processors)
+        both = compiler.parallel(merge(*inner, seen), test(image))
+        return compiler.choose(*both)
+
+    def live(quality: Live, seconds: dict[str, float]) -> Ways:
+        seen = quality("see")
+        found = quality("merge", quality("near", seen), quality("far"), seen), quality("test")
+        inner = seconds["near"], seconds["far"]
+        arm = (sum(inner) if processors == 1 else max(inner)) + seconds["merge"]
+        best = max((q for q in found if q is not None), default=None)
+        yield 1.0, best, seconds["see"] + max(arm, seconds["test"])
+
+    return Sketch(say, live)
+
+
+def _after_each_other(processors: int) -> Sketch:
+    """A parallel of what another one made."""
+
+    def say(image: Any) -> Any:
+        first = compiler.parallel(near(image), near_2(image))
+        made = compiler.parallel(far(first[0]), last(first[1]), processors=processors)
+        return compiler.choose(*made)
+
+    def live(quality: Live, seconds: dict[str, float]) -> Ways:
+        found = quality("far", quality("near")), quality("last", quality("near_2"))
+        second = seconds["far"], seconds["last"]
+        spent = max(seconds["near"], seconds["near_2"])
+        spent += sum(second) if processors == 1 else max(second)
+        yield 1.0, max((q for q in found if q is not None), default=None), spent
 
     return Sketch(say, live)
 

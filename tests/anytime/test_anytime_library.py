@@ -37,6 +37,8 @@ def small(module="find", references=None, inputs=("boxes",)) -> Profile:
             rng.random(3) if index else np.full(3, np.nan),
             (5.0, 40.0),
             bool(index % 2),
+            3 + 10 * index,
+            3 + 20 * index,
         )
         for index in range(3)
     )
@@ -257,6 +259,8 @@ def run0(**values):
         (run0(inputs={"boxes": 1.5}), r"outside \[0, 1\]"),
         (run0(inputs={}), "has inputs"),
         (run0(end=[-1.0, 2.0]), "negative"),
+        (run0(results=2), "has 3 results, and says 2 in 3 steps are all"),
+        (run0(steps=-1), "says 3 in -1 steps"),
         (run0(raw=["a", "b", "c"]), "Expected `float`"),
         (run0(raw=[None, 0.2, 0.3]), "Expected `float`"),
         (run0(complete="yes"), "Expected `bool`"),

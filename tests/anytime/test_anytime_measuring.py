@@ -297,7 +297,23 @@ def test_a_long_run_keeps_its_first_and_last_results():
     run = measured(many, [Problem(1)])["see"].recordings[0]
     assert len(run.raw) <= CHANGES
     assert (run.raw[0], run.raw[-1]) == (0, 4999 / 10000)
+    assert run.results == run.steps == 5000
     assert run.complete
+
+
+def test_a_recording_says_how_often_a_run_could_be_ended():
+    @anytime.module(quality=lambda value: value, name="see")
+    def searching():
+        for value in (0.2, 0.4):
+            for _ in range(5):
+                anytime.charge(1)
+                if anytime.expired():
+                    return
+            yield value
+
+    run = measured(searching, [Problem(1)])["see"].recordings[0]
+    assert run.results == 2
+    assert run.steps == 12
 
 
 def test_a_run_is_cut_at_its_time():

@@ -78,6 +78,26 @@ def test_as_long_as_steps_take_what_they_took_nothing_is_divided_anew():
     assert activity.why == "divided as compiled"
 
 
+def test_a_module_of_more_results_than_a_recording_keeps_takes_what_it_took():
+    @anytime.module(quality=lambda seen: seen, name="look")
+    def often(image):
+        for step in range(1, 301):
+            yield image * step / 300
+
+    @compiler.program
+    def steer(image):
+        return plan(often(image))
+
+    machine = MACHINE.with_rate("look", 0.0002)
+    scenes = [Scene(float(image)) for image in np.linspace(0.7, 1.0, 6)]
+    library = anytime.measure(steer, scenes, seconds=1.0, clock=lambda: WorkClock(machine))
+    with compiler.compile(steer, library).start(clock=WorkClock(machine)) as activity:
+        for _ in range(6):
+            activity.run(0.1, image=0.9)
+        assert not activity.drift
+        assert activity.ratios["look"] == pytest.approx(1.0, abs=0.05)
+
+
 def test_a_module_that_has_become_slower_is_noticed_and_time_divided_anew():
     activity = STEER.start(clock=WorkClock(SLOWED))
     for _ in range(30):

@@ -13,6 +13,7 @@ import anytime
 import compiler
 from anytime import AnytimeError, Machine, WorkClock
 from compiler.adaptive import plan_for
+from compiler.blocks import alone, blocks
 from compiler.division import divide, moments_within, value_of
 from compiler.objectives import Objective
 from experiments.benchmarks.compiler_adaptive import chain, gated, live
@@ -77,14 +78,18 @@ def adaptive(library):
 
 
 @settings(max_examples=15)
-@given(st.integers(0, 2**32), st.sampled_from(["branch", "loop", "choose", "tests"]))
+@given(st.integers(0, 2**32), st.sampled_from(["branch", "loop", "choose", "tests", "parallel"]))
 def test_a_policy_is_never_worth_less_than_the_best_division(seed, kind):
     rng = np.random.default_rng(seed)
     program = read(sketch(kind, rng))
     tables = random_tables(program, rng)
+    frontier = divide(tables)
+    if not len(frontier.budgets):
+        return  # there is never a result
+    decided = alone(tables) | blocks(program, tables, frontier)
     for budget in (6.0, 10.0, 20.0):  # whole ticks, as the times of the tables are
-        plan = plan_for(program, tables, budget, compiler.expected())
-        assert plan.value >= divide(tables).promise(budget) - 1e-9
+        plan = plan_for(program, tables, budget, compiler.expected(), None, decided)
+        assert plan.value >= frontier.promise(budget) - 1e-9
 
 
 def test_where_nothing_is_left_to_chance_there_is_nothing_to_adapt_to():
@@ -105,6 +110,77 @@ def test_a_policy_that_is_lived_is_worth_what_it_says(cost):
     plan = plan_for(program, tables, 60.0, objective)
     lived, error = live(program, tables, plan, objective, rng)
     assert lived == pytest.approx(plan.value, abs=4 * error)
+
+
+# Alternatives and parallels
+
+
+@anytime.module(quality=same, estimate=same)
+def glance(luck):
+    """Good at once, or for the unlucky with the sixth step."""
+    for step in range(1, 7):
+        yield 0.9 if luck >= 0.5 or step == 6 else 0.2
+
+
+@anytime.module(quality=same, estimate=same)
+def glance_back(luck):
+    """Good where a glance is not, and half of the time where it is."""
+    for step in range(1, 7):
+        yield 0.9 if luck < 0.75 or step == 6 else 0.2
+
+
+@anytime.module(quality=same, estimate=same)
+def watch(luck):
+    """Good in five steps, whatever the luck."""
+    for step in range(1, 6):
+        yield 0.85 if step == 5 else 0.1
+
+
+@anytime.module(quality=same, estimate=same)
+def move(plan):
+    for step in range(1, 11):
+        yield plan * step / 10
+
+
+@anytime.module(quality=same, estimate=same)
+def move_back(plan):
+    for step in range(1, 11):
+        yield plan * step / 10
+
+
+@compiler.program
+def either(luck):
+    """Whether to watch too is seen when the glance is there."""
+    return move(compiler.choose(glance(luck), watch(luck)))
+
+
+@compiler.program
+def at_once(luck):
+    """Which of two results is worth going on with is seen when both are there."""
+    ahead, behind = compiler.parallel(glance(luck), glance_back(luck))
+    return compiler.choose(move(ahead), move_back(behind))
+
+
+@pytest.mark.parametrize("program", [either, at_once])
+def test_what_is_run_of_alternatives_is_decided_by_what_came_before(program):
+    machine = MACHINE
+    for call in program.calls:
+        machine = machine.with_rate(call.module.name, 0.01)
+    library = anytime.measure(program, SCENES, seconds=1.0, clock=lambda: WorkClock(machine))
+    both = [compiler.compile(program, library, adaptive=a) for a in (False, True)]
+    budgets = np.linspace(both[0].least, float(both[0].frontier.budgets[-1]), 12)
+    gains = [both[1].promise(t) - both[0].promise(t) for t in budgets]
+    seconds = float(budgets[int(np.argmax(gains))])
+    assert max(gains) > 0.03
+    lived = [
+        [each.run(seconds, clock=WorkClock(machine), luck=scene.luck) for scene in SCENES]
+        for each in both
+    ]
+    static, wise = (np.mean([result.value or 0.0 for result in results]) for results in lived)
+    assert wise > static + 0.03
+    ways = {tuple((n, p.elapsed) for n, p in result.parts.items()) for result in lived[1]}
+    assert len(ways) > 1
+    assert max(result.elapsed for result in lived[1]) <= seconds + 1e-9
 
 
 # Run
@@ -204,14 +280,8 @@ def test_what_cannot_be_adapted_is_refused(library):
     def unseen(luck):
         return act(blind(look(luck)))
 
-    @compiler.program
-    def beside(luck):
-        return act(compiler.choose(*compiler.parallel(think(look(luck)), think(look(luck)))))
-
     with pytest.raises(AnytimeError, match=r"looks at what think achieved; give think an estimate"):
         compiler.compile(unseen, library, adaptive=True)
-    with pytest.raises(AnytimeError, match="leave parallel out"):
-        compiler.compile(beside, library, adaptive=True)
     with pytest.raises(AnytimeError, match="is no mean"):
         compiler.compile(chance, library, adaptive=True, objective=compiler.cvar(0.1))
 

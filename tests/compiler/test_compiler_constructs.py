@@ -111,6 +111,30 @@ def shared_processor(light):
     return join(*compiler.parallel(smooth(night(light)), day(light), processors=1))
 
 
+def joined_in_an_arm(light):
+    best = compiler.choose(day(light), night(light))
+    return join(*compiler.parallel(smooth(best), night(light)))
+
+
+def looped_in_an_arm(light):
+    return join(*compiler.parallel(compiler.loop(smooth, day(light), times=2), night(light)))
+
+
+def nested(light):
+    inner = join(*compiler.parallel(day(light), night(light)))
+    return join(*compiler.parallel(smooth(inner), day(light)))
+
+
+def nested_on_one_processor(light):
+    inner = join(*compiler.parallel(day(light), night(light), processors=1))
+    return join(*compiler.parallel(smooth(inner), day(light)))
+
+
+def one_after_the_other(light):
+    one, other = compiler.parallel(day(light), night(light))
+    return join(*compiler.parallel(smooth(one), smooth(other)))
+
+
 def two(light):
     return (
         compiler.output(day(light), deadline=0.06),
@@ -222,6 +246,30 @@ def test_each_arm_of_a_parallel_has_its_share_at_every_budget(schedules, functio
         for label, part in found.parts.items():
             assert part.elapsed <= shares[label] + 1e-9
             assert part.elapsed >= shares[label] - 0.01 or part.status is Status.COMPLETE
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        at_once,
+        shared_processor,
+        joined_in_an_arm,
+        looped_in_an_arm,
+        nested,
+        nested_on_one_processor,
+        one_after_the_other,
+    ],
+)
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_where_nothing_is_left_to_chance_a_parallel_achieves_what_it_promises(function, adaptive):
+    program = compiler.program(function)
+    for scene in (DAY, NIGHT):
+        library = anytime.measure(program, [scene], seconds=1.0, clock=clock)
+        schedule = compiler.compile(program, library, adaptive=adaptive)
+        for seconds in schedule.frontier.budgets.tolist():
+            result = run(schedule, seconds, scene)
+            assert result.value == pytest.approx(schedule.promise(seconds), abs=0.03)
+            assert result.elapsed <= seconds + 1e-9
 
 
 def test_promises_of_few_problems_are_unsure_whatever_the_program_is_made_of(schedules):

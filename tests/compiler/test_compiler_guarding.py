@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +13,7 @@ import anytime
 from anytime import Deadline, Machine, Profile, WorkClock
 from anytime.profiles import Recording
 from anytime.running import execute
-from compiler.guarding import STEPS, Steps, guard, steps_of
+from compiler.guarding import STEPS, Steps, guard, last_guard, steps_of
 
 MACHINE = Machine("m").with_rate("see", 1.0)
 STEADY = Steps((1.0, 2.0, 4.0), (1.5, 3.0, 6.0))
@@ -66,9 +68,55 @@ def test_late_steps_share_the_last_place_and_the_tail_is_never_below_the_median(
     assert all(median >= 0 for median in steps.median)
 
 
+def test_results_that_a_recording_left_out_count_as_evenly_spread():
+    whole = recorded(np.arange(1, 201))
+    thinned = whole.recordings[0]
+    kept = np.unique(np.linspace(0, 199, 20).round().astype(int))
+    few = replace(
+        whole,
+        recordings=(
+            replace(
+                thinned,
+                seconds=thinned.seconds[kept],
+                work=thinned.work[kept],
+                raw=thinned.raw[kept],
+                estimates=thinned.estimates[kept],
+                results=200,
+            ),
+        ),
+    )
+    assert steps_of(few).median == pytest.approx(steps_of(whole).median)
+
+
+def test_a_last_call_that_can_be_ended_between_results_is_not_held_to_them():
+    searched = recorded([1, 6], [1, 7])
+    some = (replace(run, steps=12) for run in searched.recordings)
+    steps = steps_of(replace(searched, recordings=tuple(some)))
+    assert not steps.whole
+    assert last_guard(steps, 3.0) is None
+    assert last_guard(steps_of(searched), 3.0) is not None
+
+
 def test_without_a_profile_there_is_no_guard():
-    assert guard(None, 1.0, 2.0) is None
-    assert guard(Steps((), ()), 1.0, 2.0) is None
+    for unknown in (None, Steps((), ())):
+        assert guard(unknown, 1.0, 2.0) is None
+        assert last_guard(unknown, 1.0) is None
+
+
+def test_the_last_call_begins_no_step_that_is_known_to_be_too_long():
+    ladder = Steps((1.0, 2.0, 4.0, 8.0), (1.5, 3.0, 6.0, 12.0))
+    for ends, count in ((1.0, 1), (2.9, 1), (3.0, 2), (6.9, 2), (7.0, 3), (14.9, 3), (15.0, 4)):
+        assert results(last_guard(ladder, ends), hard=ends) == count
+
+
+def test_it_goes_by_the_pace_of_the_run_after_its_first_step():
+    slow = (1, 4, 8, 16)  # twice as long as usual, but for the first step
+    assert results(last_guard(STEADY, 12.0), slow, hard=12.0) == 2
+    assert results(last_guard(STEADY, 13.0), slow, hard=13.0) == 3
+
+
+def test_beyond_the_steps_that_are_known_it_goes_by_those_of_the_run():
+    assert results(last_guard(Steps((1.0,), (1.0,)), 10.0), (1,) * 20, hard=10.0) == 10
 
 
 def test_the_median_of_the_next_step_is_held_against_the_share():
