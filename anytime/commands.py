@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -95,10 +97,6 @@ def profile(options: argparse.Namespace) -> Answer:
     The runs are kept beside them, NAME.runs, as they come; `--resume` goes on where they end. A
     problem that fails is left out and told, and the exit code is then 1.
     """
-    import itertools
-
-    import numpy as np
-
     from anytime import Module, ProfileLibrary, measure
     from anytime.programs import Program
 
@@ -113,20 +111,14 @@ def profile(options: argparse.Namespace) -> Answer:
         what = resolve(reference)
         if not isinstance(what, Module | Program):
             raise AnytimeError(f"{reference} is {type(what).__name__}, not a module or program")
-        source = resolve(options.problems) if options.problems else _problems(what)
-        name = options.problems or f"problems of {what.name}"
-        try:
-            made = source(np.random.default_rng(options.seed))
-            problems = list(itertools.islice(made, runs))
-        except TypeError as error:
-            raise AnytimeError(
-                f"{name}: {error}; give a function (rng) that returns or yields problems"
-            ) from error
+        problems = _problems(what, options, runs)
         store = kept / f"{what.name}.runs"
-        if not options.resume:
-            store.unlink(missing_ok=True)
         until = _until_regret(what, until_regret, options.seconds) if until_regret else None
-        with told() as warned, progress(f"measuring {what.name}") as report:
+        with (
+            nullcontext() if options.resume else _anew(store),
+            told() as warned,
+            progress(f"measuring {what.name}") as report,
+        ):
             measured = measure(
                 what,
                 problems,
@@ -163,10 +155,6 @@ def calibrate(options: argparse.Namespace) -> Answer:
 
     The exit code is 1 when a module has changed, which no machine explains.
     """
-    import itertools
-
-    import numpy as np
-
     from anytime import Module, ProfileLibrary
     from anytime.calibrating import calibrate
     from anytime.programs import Program
@@ -174,9 +162,7 @@ def calibrate(options: argparse.Namespace) -> Answer:
     what = resolve(options.module)
     if not isinstance(what, Module | Program):
         raise AnytimeError(f"{options.module} is {type(what).__name__}, not a module or program")
-    source = resolve(options.problems) if options.problems else _problems(what)
-    made = source(np.random.default_rng(options.seed))
-    problems = list(itertools.islice(made, CALIBRATION))
+    problems = _problems(what, options, CALIBRATION)
     found = calibrate(ProfileLibrary(options.library), what, problems, seed=options.seed)
     found.library.save(options.output)
     data = {
@@ -203,14 +189,41 @@ def doctor(options: argparse.Namespace) -> Answer:
     return Answer(repr(found), {**asdict(found), "quiet": found.quiet})
 
 
-def _problems(what: Any) -> Any:
+def _problems(what: Any, options: argparse.Namespace, most: int) -> list[Any]:
+    """The first problems of a module or program, or of the function that the user names."""
+    import itertools
+
+    import numpy as np
+
     module = what if hasattr(what, "problems") else what.output.module
-    if module.problems is None:
+    source = resolve(options.problems) if options.problems else module.problems
+    if source is None:
         raise AnytimeError(
             f"{what.name} names no problems of its own; add --problems FILE.py:FUNCTION, a "
             "function (rng) -> problems"
         )
-    return module.problems
+    try:
+        return list(itertools.islice(source(np.random.default_rng(options.seed)), most))
+    except Exception as error:
+        raise AnytimeError(
+            f"{options.problems or f'problems of {what.name}'}: {type(error).__name__}: {error}; "
+            "give a function (rng) that returns or yields problems"
+        ) from error
+
+
+@contextmanager
+def _anew(store: Path) -> Iterator[None]:
+    """Runs that are kept from before make way for new ones, as soon as there are any."""
+    before = store.with_name(f"{store.name}.before")
+    if store.exists():
+        store.replace(before)
+    try:
+        yield
+    finally:
+        if before.exists() and store.exists():
+            before.unlink()
+        elif before.exists():
+            before.replace(store)
 
 
 def library(options: argparse.Namespace) -> Answer:

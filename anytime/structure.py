@@ -73,11 +73,22 @@ def _parallels(program: Program) -> list[Group]:
 
 
 def within(program: Program, group: Group) -> frozenset[Node]:
-    """The calls of a group, and the joins between them: what their results are joined to for
-    others of its calls."""
+    """The calls of a group, and the joins of their results: between them, and of nothing else."""
     calls = frozenset(node for node in program.nodes if node.label in group.calls)
     above = frozenset().union(*(behind(call) for call in calls))
-    return frozenset(node for node in above if behind(node) & calls)
+    found = {node for node in above if behind(node) & calls}
+    for node in program.nodes:  # in order: what a node is made from comes before it
+        made_from = [a for a in node.arguments if isinstance(a, Call | Join)]
+        if isinstance(node, Join) and made_from and found.issuperset(made_from):
+            found.add(node)
+    return frozenset(found)
+
+
+def outlets(program: Program, inside: frozenset[Node]) -> list[Node]:
+    """Those of some nodes that others are made from, or the program's output is, in order."""
+    used = {a for node in program.nodes if node not in inside for a in node.arguments}
+    used.add(program.output)
+    return [node for node in program.nodes if node in inside and node in used]
 
 
 def groups(program: Program) -> tuple[Group, ...]:

@@ -17,7 +17,7 @@ from anytime.pictures import clipped
 from anytime.results import Result
 from compiler.compiled import CompiledProgram
 from compiler.division import divide
-from compiler.guarding import Steps
+from compiler.guarding import STEPS, Steps
 
 WEIGHT = 0.2  # of the newest run in a module's running ratio
 WILDEST = 4.0  # times as long, or as short, as one run may claim that its steps take
@@ -99,6 +99,7 @@ class Activity:
         if steps is None or not steps.median:
             return
         took = np.diff([change.seconds for change in part.history], prepend=0.0).tolist()
+        took = took[: STEPS - 1]  # those after them are not known one by one
         ratio = steps.pace(took)
         if "memory" in module.filled:  # the first result is an old one
             ratio = replace(steps, median=steps.median[1:] or steps.median).pace(took[1:])

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from anytime.errors import AnytimeError
 from anytime.programs import Program
 from anytime.structure import apart
-from compiler.blocks import Block, alone, blocks
+from compiler.blocks import DIVISION, Block, alone, blocks
 from compiler.branching import answered, asked, before, joined, mean, passed_over, skips
 from compiler.division import Frontier, nothing
 from compiler.objectives import Objective
@@ -30,7 +30,6 @@ from compiler.stopping import stop, transitions
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
-DIVISION = "a division"  # the name of an axis; no node has it
 BUDGETS = 24  # for which a policy is made
 STATES = 40_000_000  # numbers that the choice of one call is made from, at most
 
@@ -143,15 +142,9 @@ def _begin(
     block: Block, after: tuple[str, ...], later: Floats, tick: float, floor: bool
 ) -> tuple[tuple[str, ...], Floats, NDArray[np.int16]]:
     """The value before a block, and its division, for each state and ticks left."""
-    known = before(after, block.labels, _feeds(block))
-    factors: list[tuple[tuple[str, ...], Floats]] = []
-    for table, moments in zip(block.tables, block.moments.T, strict=True):
-        if table.rule is None:
-            chances = table.chances[..., moments, :]
-            factors.append(((*table.feeds, DIVISION, table.label), chances))
-        else:
-            factors.append(((*table.feeds, table.label), table.chances[..., 0, :]))
-    reached = mean(factors, later, after, (*known, DIVISION))
+    known = before(after, block.labels, block.feeds)
+    names = (*block.feeds, DIVISION, *block.outside)
+    reached = mean(block.chances, names, later, after, (*known, DIVISION))
     left = np.arange(TICKS + 1) - _units(block.seconds, tick, floor)[:, None]  # [D, ticks]
     shifted = np.take_along_axis(
         reached, np.broadcast_to(np.maximum(left, 0), reached.shape), axis=-1
@@ -182,15 +175,9 @@ def _cells(
 ) -> int:
     """Of how many numbers a block is decided: states by divisions by ticks."""
     levels = {table.label: len(table.levels) for table in tables}
-    state = before(after, block.labels, _feeds(block))
+    state = before(after, block.labels, block.feeds)
     size = math.prod(levels.get(name, 2) for name in state)
     return size * (divisions or len(block.moments)) * TICKS
-
-
-def _feeds(block: Block) -> list[str]:
-    """What a block is made from."""
-    feeds = dict.fromkeys(feed for table in block.tables for feed in table.feeds)
-    return [feed for feed in feeds if feed not in block.labels]
 
 
 def _watch(

@@ -7,18 +7,21 @@ achieved: the whole parallel has one of the divisions that are the best for some
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anytime.programs import Program
-from anytime.structure import outermost, within
+from anytime.structure import outermost, outlets, within
 from compiler import costs
 from compiler.division import Frontier
+from compiler.elimination import SUM_PRODUCT, Factor, eliminate
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
+DIVISION = "a division"  # the name of an axis; no node has it
 DIVISIONS = 64  # of a parallel that a policy chooses from, at most
 
 
@@ -27,11 +30,13 @@ class Block:
     """A call, or the calls of a parallel with the joins between them, and the ways to divide time
     among them.
 
-    tables: [n] of the nodes, in their order. moments: [D, n] of each, for every division.
+    tables: [n] of the nodes, in their order. moments: [D, n] of each, for every division. outside:
+    labels of those that others look at.
     """
 
     tables: tuple[Table, ...]
     moments: NDArray[np.intp]
+    outside: tuple[str, ...]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -53,18 +58,40 @@ class Block:
         calls = [table for table in self.tables if table.rule is None]
         return np.broadcast_to(costs.total(calls, list(self.shares.T)), len(self.moments))
 
+    @property
+    def feeds(self) -> tuple[str, ...]:
+        """Labels of what it is made from."""
+        feeds = dict.fromkeys(feed for table in self.tables for feed in table.feeds)
+        return tuple(feed for feed in feeds if feed not in self.labels)
+
+    @cached_property
+    def chances(self) -> Floats:
+        """Probability of the levels of what others look at, [feeds, D, outside]."""
+        factors: list[Factor] = []
+        for table, moments in zip(self.tables, self.moments.T, strict=True):
+            if table.rule is None:
+                scope = (*table.feeds, DIVISION, table.label)
+                factors.append(Factor(scope, table.chances[..., moments, :]))
+            else:
+                factors.append(Factor((*table.feeds, table.label), table.chances[..., 0, :]))
+        kept = (*self.feeds, DIVISION, *self.outside)
+        return eliminate(factors, kept, SUM_PRODUCT)[0].table
+
     def thinned(self, count: int) -> Block:
         """With at most so many of its divisions, from the first to the last."""
         if len(self.moments) <= count:
             return self
         kept = np.linspace(0, len(self.moments) - 1, count).round().astype(int)
-        return Block(self.tables, self.moments[kept])
+        return replace(self, moments=self.moments[kept])
 
 
 def alone(tables: Sequence[Table]) -> dict[str, Block]:
     """Each call as a block of its own, with all of its moments, by label."""
     calls = [table for table in tables if table.rule is None]
-    return {each.label: Block((each,), np.arange(len(each.times))[:, None]) for each in calls}
+    return {
+        each.label: Block((each,), np.arange(len(each.times))[:, None], (each.label,))
+        for each in calls
+    }
 
 
 def blocks(program: Program, tables: Sequence[Table], frontier: Frontier) -> dict[str, Block]:
@@ -74,27 +101,30 @@ def blocks(program: Program, tables: Sequence[Table], frontier: Frontier) -> dic
     """
     found: dict[str, Block] = {}
     for group in outermost(program):
-        inside = {node.label for node in within(program, group)}
-        places = [place for place, table in enumerate(tables) if table.label in inside]
-        block = _parallel([tables[place] for place in places], frontier.shares[:, places])
-        found |= dict.fromkeys(inside, block)
+        inside = within(program, group)
+        places = [place for place, node in enumerate(program.nodes) if node in inside]
+        made = [tables[place] for place in places]
+        outside = tuple(node.label for node in outlets(program, inside))
+        block = _parallel(made, outside, frontier.shares[:, places])
+        found |= dict.fromkeys(block.labels, block)
     return found
 
 
-def _parallel(tables: Sequence[Table], shares: Floats) -> Block:
+def _parallel(tables: Sequence[Table], outside: tuple[str, ...], shares: Floats) -> Block:
     """A parallel with the divisions that it has in a frontier's rows, [F, n] seconds, and that
     which gives it no time, for when none is left."""
     nothing = np.zeros((1, len(tables)))
     rows = np.unique(_moments(tables, np.concatenate([nothing, shares])), axis=0)
-    block = Block(tuple(tables), rows)
-    block = Block(block.tables, rows[np.argsort(block.seconds, kind="stable")]).thinned(DIVISIONS)
+    block = Block(tuple(tables), rows, outside)
+    order = np.argsort(block.seconds, kind="stable")
+    block = replace(block, moments=rows[order]).thinned(DIVISIONS)
     stretched = np.zeros(block.moments.shape)
     columns = [place for place, table in enumerate(tables) if table.rule is None]
     for row, (given, seconds) in enumerate(zip(block.shares, block.seconds, strict=True)):
         every = np.zeros(len(tables))
         every[columns] = given
         stretched[row, columns] = [*costs.stretched(tables, every.tolist(), seconds).values()]
-    return Block(block.tables, np.unique(_moments(tables, stretched), axis=0))
+    return replace(block, moments=np.unique(_moments(tables, stretched), axis=0))
 
 
 def _moments(tables: Sequence[Table], shares: Floats) -> NDArray[np.intp]:

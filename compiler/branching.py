@@ -26,7 +26,7 @@ def joined(
     if isinstance(node.rule, Branch):
         feeds, chances = _split(node, table, tables)
     known = before(after, [table.label], feeds)
-    return known, mean([((*feeds, table.label), chances)], later, after, known)
+    return known, mean(chances, (*feeds, table.label), later, after, known)
 
 
 def _split(join: Join, table: Table, tables: Sequence[Table]) -> tuple[tuple[str, ...], Floats]:
@@ -75,7 +75,7 @@ def answered(
         odds[(*cell, 0)] = sum(chance for chance, _ in rule.answered(known, True))
         odds[(*cell, 1)] = 1 - odds[(*cell, 0)]
     known = before(after, [name], feeds)
-    return known, mean([((*feeds, name), odds)], later, after, known)
+    return known, mean(odds, (*feeds, name), later, after, known)
 
 
 def passed_over(
@@ -155,20 +155,18 @@ def _quality(by_label: Mapping[str, Table], level: Mapping[str, int], node: obje
 
 
 def mean(
-    factors: Sequence[tuple[Sequence[str], Floats]],
+    chances: Floats,
+    names: Sequence[str],
     later: Floats,
     after: Sequence[str],
     before: Sequence[str],
 ) -> Floats:
-    """The values `later` [after, ticks] in the mean over chances, each [names]; [before, ticks]."""
-    names = dict.fromkeys([*(n for axes, _ in factors for n in axes), *after, *before])
-    letter = dict(zip(names, string.ascii_letters, strict=False))
+    """The values `later` [after, ticks] in the mean over `chances` [names], [before, ticks]."""
+    letter = dict(zip(dict.fromkeys((*names, *after, *before)), string.ascii_letters, strict=False))
+    one, other, made = ("".join(letter[n] for n in axes) for axes in (names, after, before))
     tick = string.ascii_letters[len(letter)]
-    ones = ["".join(letter[name] for name in axes) for axes, _ in factors]
-    other, made = ("".join(letter[name] for name in axes) + tick for axes in (after, before))
-    operands = [chances for _, chances in factors]
     return np.asarray(
-        np.einsum(",".join([*ones, other]) + f"->{made}", *operands, later, optimize=True)
+        np.einsum(f"{one},{other}{tick}->{made}{tick}", chances, later, optimize=True)
     )
 
 

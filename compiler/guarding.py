@@ -39,13 +39,11 @@ class Steps:
         return took / normal if took > 0 and normal > 0 else math.nan
 
     def next(self, done: int, seconds: Floats) -> Floats:
-        """How long the next step of runs will take of which `done` are over, which took these
-        seconds without the first, [runs]: as usual, at the pace of each run so far. The first step
-        tells nothing of it, for what is made ready there takes its own time, or is at hand. No
-        pace is faster than recorded ones are."""
-        usual = sum(self.median[1:done])
+        """How long the next step may take of runs whose first `done` took these seconds, [runs]:
+        the 95th percentile, and more for who has been slower than that so far."""
+        usual = sum(self.p95[:done])
         pace = seconds / usual if usual > 0 else np.ones_like(seconds)
-        return self.median[done] * np.maximum(pace, math.exp(-self.spread))
+        return self.p95[done] * np.maximum(pace, 1.0)
 
 
 def steps_of(profile: Profile) -> Steps:
@@ -69,11 +67,13 @@ def steps_of(profile: Profile) -> Steps:
 
 
 def _durations(run: Recording) -> list[float]:
-    """Seconds of each of a run's first steps."""
+    """Seconds of each of a run's first steps; the last may find that nothing is left to do."""
     places = np.linspace(1, run.results, len(run.seconds)).round()
     each = np.arange(1, min(run.results, LONGEST) + 1)
     ends = np.interp(each, [0, *places], [0.0, *run.seconds])
-    return np.diff(ends, prepend=0.0).tolist()
+    steps: list[float] = np.diff(ends, prepend=0.0).tolist()
+    rest = run.end[0] - float(run.seconds[-1]) if run.complete and len(run.seconds) else 0.0
+    return [*steps, rest] if rest > INSTANT and run.results < LONGEST else steps
 
 
 def guard(steps: Steps | None, share_ends: float, hard_end: float) -> Callable[[Run], bool] | None:
@@ -114,8 +114,9 @@ def last_guard(steps: Steps | None, ends: float) -> Callable[[Run], bool] | None
         done = len(run.history)
         if not 0 < done < min(len(known.median), STEPS - 1):
             return run.may_step()
-        took = np.array([run.history[-1].seconds - run.history[0].seconds])
-        return run.deadline.clock.now() + float(known.next(done, took)[0]) <= ends + INSTANT
+        took = np.array([run.history[-1].seconds])
+        step_ends = run.started + float(took[0] + known.next(done, took)[0])
+        return max(run.deadline.clock.now(), step_ends) <= ends + INSTANT
 
     return may_step
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from anytime.errors import AnytimeError
 from anytime.joins import Several, Tests
 from anytime.modules import Module
 from anytime.programs import Call, Constant, Input, Join, Program, reading
-from anytime.structure import behind, groups, in_order
+from anytime.structure import Group, behind, groups, in_order
 from compiler.constructs import Output, several
 
 _TAKEN = {"self", "seconds", "deadline", "clock", "rng", "on_result", "memory"}
@@ -64,7 +64,7 @@ def program(function: Callable[..., Any]) -> Program:
         for call in used:
             _check(call)
         found = in_order(function.__name__, names, output, opened.parallels, opened.nodes)
-        groups(found)
+        _check_deadlines(found, groups(found))
     except AnytimeError as error:
         raise AnytimeError(f"{where}: {error}") from None
     return found
@@ -76,14 +76,23 @@ def _check(node: Call | Join) -> None:
         test = isinstance(argument, Join) and isinstance(argument.rule, Tests)
         if test and isinstance(node, Call):
             raise AnytimeError(f"{node.label} is called with a test, {argument!r}; use branch")
-    if isinstance(node, Join) and isinstance(node.rule, Several):
-        parts = [behind(argument) for argument in node.arguments]
-        apart = sum(map(len, parts)) == len(frozenset[Call | Join]().union(*parts))
-        if not apart and any(deadline < float("inf") for deadline in node.rule.deadlines):
-            raise AnytimeError(
-                "results with deadlines of their own share a call; give each its own, or let one "
-                "deadline do for all"
-            )
+
+
+def _check_deadlines(program: Program, groups: Sequence[Group]) -> None:
+    """Refuse results with deadlines of their own that are not independent of each other."""
+    output = program.output
+    if not isinstance(output, Join) or not isinstance(output.rule, Several):
+        return
+    if all(deadline == float("inf") for deadline in output.rule.deadlines):
+        return
+    parts = [{node.label for node in behind(argument)} for argument in output.arguments]
+    shared = sum(map(len, parts)) > len(set[str]().union(*parts))
+    beside = any(sum(bool(part & group.calls) for part in parts) > 1 for group in groups)
+    if shared or beside:
+        raise AnytimeError(
+            f"results with deadlines of their own share a {'call' if shared else 'parallel'}; give "
+            "each its own, or let one deadline do for all"
+        )
 
 
 def _not_a_call(output: object) -> str:

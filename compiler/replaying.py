@@ -240,7 +240,7 @@ def _to_the_end(
     may = np.ones(seconds.shape, dtype=bool)
     for done in range(1, seconds.shape[1] if known.whole else 1):
         if done < min(len(known.median), STEPS - 1):
-            expected = known.next(done, at[:, done - 1] - at[:, 0])
+            expected = known.next(done, at[:, done - 1] - now)
         else:
             recent = steps[:, max(0, done - RECENT) : done]
             expected = np.sort(recent, axis=1)[:, recent.shape[1] // 2]

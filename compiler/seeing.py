@@ -11,7 +11,7 @@ from anytime.errors import AnytimeError
 from anytime.joins import Branch
 from anytime.profiles import Profile
 from anytime.programs import Join, Program
-from anytime.structure import outermost, within
+from anytime.structure import outermost, outlets, within
 from compiler.objectives import Objective
 from compiler.policies import Seen, label_of
 from compiler.tables import Table, levels_of
@@ -84,14 +84,20 @@ def _test(table: Table) -> Table:
 
 def _within(program: Program) -> set[str]:
     """Labels of what only the parallels themselves look at: the policy does not."""
-    found = set[str]()
+    hidden = set[str]()
     for group in outermost(program):
         inside = within(program, group)
-        for node in inside:
-            users = {user for user in program.nodes if node in user.arguments}
-            if users <= inside:
-                found.add(node.label)
-    return found
+        pending: list[object] = [*outlets(program, inside)]
+        shown = set[object]()
+        while pending:  # a join shows what it is made from, but not what its tests say
+            node = pending.pop()
+            shown.add(node)
+            if isinstance(node, Join):
+                tests = node.rule.tests if isinstance(node.rule, Branch) else ()
+                given = (a for place, a in enumerate(node.arguments) if place not in tests)
+                pending += [a for a in given if a in inside]
+        hidden |= {node.label for node in inside if node not in shown}
+    return hidden
 
 
 def _calibrated(profile: Profile) -> Seen:

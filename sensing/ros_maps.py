@@ -82,8 +82,9 @@ def write_ros_map(grid: GridMap, path: str | os.PathLike[str]) -> None:
     picture = path.with_suffix(".pgm")
     write_pgm(image, picture)
     x, y, yaw = (float(part) for part in grid.origin)
+    image_name = yaml.safe_dump(picture.name, allow_unicode=True, width=math.inf)
     path.write_text(
-        f"image: {yaml.safe_dump(picture.name, allow_unicode=True).splitlines()[0]}\n"
+        f"image: {image_name.splitlines()[0]}\n"
         "mode: trinary\n"
         f"resolution: {float(grid.resolution)!r}\n"
         f"origin: [{x!r}, {y!r}, {yaw!r}]\n"

@@ -149,7 +149,8 @@ class SonarMap:
             return self
         right, down = round((x - middle[0]) / self.cell), round((middle[1] - y) / self.cell)
         moved = np.full_like(self.log_odds, _PRIOR)
-        kept = moved[max(0, -down) : rows - max(0, down), max(0, -right) : columns - max(0, right)]
+        below, beside = max(0, rows - max(0, down)), max(0, columns - max(0, right))
+        kept = moved[max(0, -down) : below, max(0, -right) : beside]
         kept[...] = self.log_odds[max(0, down) :, max(0, right) :][: kept.shape[0], : kept.shape[1]]
         corner = self.corner[0] + right * self.cell, self.corner[1] - down * self.cell
         return replace(self, log_odds=moved, corner=corner)

@@ -36,6 +36,8 @@ LOST = -2
 RUNAWAY = 1_000_000
 """Choices after which one run of a model is given up."""
 
+_MOST_VALUES = 2**32  # of an integer choice: from so many bits it is drawn
+
 _U = np.uint64
 _GOLDEN, _FIRST, _SECOND = _U(0x9E3779B97F4A7C15), _U(0xBF58476D1CE4E5B9), _U(0x94D049BB133111EB)
 _S11, _S27, _S30, _S31, _S32 = _U(11), _U(27), _U(30), _U(31), _U(32)
@@ -63,7 +65,7 @@ def draw_unit(h: Any) -> float:
 
 @njit(cache=True, forceinline=True)
 def draw_below(h: Any, n: int) -> int:
-    """Uniform in [0, n), for n < 2^32."""
+    """Uniform in [0, n), for n <= 2^32."""
     return np.int64(((draw_bits(h) >> _S32) * _U(n)) >> _S32)
 
 
@@ -227,6 +229,9 @@ def _due_now(h: Any, cell: int) -> bool:
 def flip(header: int, stream: int, p: float) -> bool:
     h = header_at(header)
     cell = _asked(header, h, stream, FLIP)
+    if p <= 0.0 or p >= 1.0:  # whatever was inherited, it is no longer possible, or sure
+        store_real(h.genome, cell, np.float64(p >= 1.0))
+        return p >= 1.0
     value = load_real(h.genome, cell)
     if value == value and not _due(h, cell):
         return value != 0.0
@@ -247,8 +252,8 @@ def _flip_anew(header: int, cell: int, value: float, p: float) -> bool:
 @njit(cache=True, forceinline=True)
 def randint(header: int, stream: int, n: int) -> int:
     h = header_at(header)
-    if n < 1:
-        raise ValueError("randint(source, n) was asked with n < 1; n is the number of values")
+    if not 1 <= n <= _MOST_VALUES:
+        raise ValueError("randint(source, n) takes a number of values n from 1 to 2**32")
     cell = _asked(header, h, stream, RANDINT)
     value = load_real(h.genome, cell)
     if 0.0 <= value < n and not _due(h, cell):
@@ -271,6 +276,8 @@ def _randint_anew(header: int, cell: int, value: float, n: int) -> int:
 @njit(cache=True, forceinline=True)
 def gaussian(header: int, stream: int, mean: float, sigma: float) -> float:
     h = header_at(header)
+    if not sigma >= 0.0:
+        raise ValueError("gaussian(source, mean, sigma) was asked with a sigma < 0")
     cell = _asked(header, h, stream, GAUSSIAN)
     value = load_real(h.genome, cell)
     if value == value and not _due(h, cell):
@@ -295,8 +302,8 @@ def _gaussian_anew(
 @njit(cache=True)
 def uniform(header: int, stream: int, low: float, high: float) -> float:
     h = header_at(header)
-    if not low <= high:
-        raise ValueError("uniform(source, low, high) was asked with low > high")
+    if not (low <= high and high - low < math.inf):
+        raise ValueError("uniform(source, low, high) was asked with low > high, or without end")
     cell = _asked(header, h, stream, UNIFORM)
     value = load_real(h.genome, cell)
     if not low <= value <= high:
@@ -362,6 +369,8 @@ def exponential(header: int, stream: int, scale: float) -> float:
 @njit(cache=True)
 def lognormal(header: int, stream: int, mean: float, sigma: float) -> float:
     h = header_at(header)
+    if not sigma >= 0.0:
+        raise ValueError("lognormal(source, mean, sigma) was asked with a sigma < 0")
     cell = _asked(header, h, stream, LOGNORMAL)
     value = load_real(h.genome, cell)
     if not value > 0.0:

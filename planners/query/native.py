@@ -13,6 +13,7 @@ import ast
 import hashlib
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -224,9 +225,9 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
         last = function is text.functions[-1]
         inlined = places[id(function.original)] == 1
         try:
-            built[id(function.original)] = njit(made, cache=last, forceinline=inlined)
+            built[id(function.original)] = _compiled(made, inlined, cache=last)
         except RuntimeError:  # nowhere to keep the code: the model is no file's
-            built[id(function.original)] = njit(made, forceinline=inlined)
+            built[id(function.original)] = _compiled(made, inlined)
     dispatcher = built[id(text.functions[-1].original)]
     try:
         dispatcher.compile(types.float64(rng, *[from_dtype(world)] * takes_world))
@@ -235,6 +236,11 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
     compiled = next(iter(dispatcher.overloads.values()))
     address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return Native(address, bool(dispatcher.stats.cache_hits), dispatcher)
+
+
+def _compiled(made: Callable[..., Any], inlined: bool, *, cache: bool = False) -> Any:
+    # Without the check an index beyond an array of the world reads whatever stands there.
+    return njit(made, cache=cache, forceinline=inlined, boundscheck=True)
 
 
 def _places(text: Text) -> Counter[int]:
@@ -283,7 +289,7 @@ def _mark(text: Text) -> str:
 
 def _bytes(constant: Any) -> bytes:
     if isinstance(constant, np.ndarray):
-        return constant.tobytes()
+        return f"{constant.dtype.str} {constant.shape} ".encode() + constant.tobytes()
     # of a function the name: its text is the engine's, which is in the digest
     return str(getattr(constant, "__name__", None) or repr(constant)).encode()
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anytime.clocks import Clock, Deadline, WorkClock
+from anytime.clocks import Clock, Deadline, WorkClock, is_number
 from anytime.errors import AnytimeError
 from planners.query import choosing, genetics
 from planners.query.background import Share, Turns, Worker
@@ -159,6 +159,10 @@ class Query:
         Zero or negative seconds mean stop now; what was found before is returned.
         Raises AnytimeError if none of the three is given, or nothing was found.
         """
+        if any(math.isnan(each) for each in (seconds, evaluations, until)):
+            raise AnytimeError(
+                f"seconds={seconds}, evaluations={evaluations}, until={until}; give numbers"
+            )
         if seconds == math.inf and evaluations == math.inf and until == -math.inf:
             raise AnytimeError(
                 "give seconds=…, evaluations=… or until=…: a query never ends itself"
@@ -187,7 +191,8 @@ class Query:
 
     def suggest(self, choices: Mapping[Address, Any]) -> None:
         """Put known choices into the population, in the place of its worst: yesterday's plan, or
-        what an expert would do. Choices that the model asks for beyond them are drawn.
+        what an expert would do. Choices that the model asks for beyond them are drawn, those that
+        are constrained stay as they are.
 
         Raises AnytimeError for an address that the model never asked for.
         """
@@ -195,11 +200,15 @@ class Query:
             self.step()
         with self._turns.take():
             self.world.take_over()
-            genetics.adopt(self._memory.address, self._valued(choices))
+            genetics.adopt(self._memory.address, self._valued(choices, constrained=True))
             self._best = None
 
     def value_of(self, choices: Mapping[Address, Any]) -> float:
-        """What the model returns for these choices in the newest world; others are drawn."""
+        """What the model returns for these choices in the newest world; others are drawn.
+
+        inf for NaN, and for a run of more than 8192 choices. Raises AnytimeError for an address
+        that the model never asked for.
+        """
         with self._turns.take():
             self.world.take_over()
             return self._valued(choices)
@@ -232,19 +241,19 @@ class Query:
         value = self.model(Rng.of(self._sources), world)
         genetics.settle(self._memory.address, row, float(value))
 
-    def _grow(self) -> None:
+    def _grow(self) -> bool:
+        """Make the tables larger that were too small, if they may be; whether one was."""
         memory, reasons = self._memory, self._memory["grow"]
-        if not reasons:
-            return
-        if reasons & choosing.FEW_STREAMS:
-            memory.grow("most_streams")
-        if reasons & choosing.FEW_CELLS:
-            memory.grow("most_cells")
-        if reasons & choosing.NARROW and memory["width"] < _LONGEST:
-            memory.grow("width")
-        if reasons & choosing.SHORT and memory["longest"] < _LONGEST:
-            memory.grow("longest")
+        due = {
+            "most_streams": reasons & choosing.FEW_STREAMS,
+            "most_cells": reasons & choosing.FEW_CELLS,
+            "width": reasons & choosing.NARROW and memory["width"] < _LONGEST,
+            "longest": reasons & choosing.SHORT and memory["longest"] < _LONGEST,
+        }
+        for table in filter(due.get, due):
+            memory.grow(table)
         memory["grow"] = 0
+        return any(due.values())
 
     # --- What the tables hold.
 
@@ -267,31 +276,52 @@ class Query:
 
     def _cell(self, address: Address) -> int:
         source, index = address
-        kind = self._sources.kinds.get(source.rsplit("/", 1)[-1] if "/" in source else source)
-        kind = self._sources.kinds.get(source, kind)
-        if kind is None or index < 0:
-            known = ", ".join(self._sources.kinds)
-            raise AnytimeError(f"the model has no choice ({source!r}, {index}); it asks {known}")
-        return self._sources.locate((source, index), kind)
+        *path, name = source.split("/") if source not in self._sources.kinds else [source]
+        kind = self._sources.kinds.get(name)
+        known = kind is not None and len(path) % 2 == 0
+        known = known and all(scope in self._sources.numbers for scope in path[::2])
+        known = known and all(place.isdecimal() for place in path[1::2])
+        if not known or not is_number(index) or index != int(index) or not 0 <= index < _LONGEST:
+            asked = ", ".join(self._sources.kinds)
+            raise AnytimeError(f"the model has no choice ({source!r}, {index}); it asks {asked}")
+        assert kind is not None
+        return self._sources.locate((source, int(index)), kind)
 
-    def _valued(self, choices: Mapping[Address, Any]) -> float:
-        """Run the model once beside the populations: in the spare row of the children."""
+    def _valued(self, choices: Mapping[Address, Any], *, constrained: bool = False) -> float:
+        """Run the model once beside the populations: in the spare row of the children.
+
+        constrained: make the choices that are constrained as they are. inf for a run that is longer
+        than any can be.
+        """
         memory = self._memory
         cells = {self._cell(address): float(value) for address, value in choices.items()}
+        if constrained:
+            fixed = memory.blocks["fixed"]
+            cells |= {int(cell): float(fixed[cell]) for cell in np.flatnonzero(~np.isnan(fixed))}
         kept = {name: memory[name] for name in ("random", "evaluations", "constrained")}
-        row = memory["size"]
         memory["constrained"] = 0
+        try:
+            while True:
+                value = self._valued_once(cells)
+                memory["random"] = kept["random"]
+                memory["grow"] = memory["overflow"]
+                if not self._grow():
+                    break
+        finally:
+            for name, before in kept.items():
+                memory[name] = before
+        return math.inf if math.isnan(value) or memory["overflow"] else value
+
+    def _valued_once(self, cells: Mapping[int, float]) -> float:
+        memory, row = self._memory, self._memory["size"]
         genetics.prepare(memory.address, row)
         genome = memory.blocks["genomes"][(1 - memory["side"]) * (row + 1) + row]
+        genome[:] = np.nan
         for cell, value in cells.items():
             genome[cell] = value
         if self._native is None:
-            value = float(self.model(Rng.of(self._sources), self.world.plain))
-        else:
-            value = genetics.call(memory.address, self._native.address, self.world.address)
-        for name, before in kept.items():
-            memory[name] = before
-        return math.inf if math.isnan(value) else value
+            return float(self.model(Rng.of(self._sources), self.world.plain))
+        return genetics.call(memory.address, self._native.address, self.world.address)
 
 
 def _text(model: Model) -> Text | None:

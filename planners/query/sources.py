@@ -30,7 +30,8 @@ class Sources:
         for name in text.names:
             self.number(name)
         for name, kind in text.sources.items():
-            self.stream(-1, name, kind)
+            while self.stream(-1, name, kind) < 0:
+                self.memory.grow("most_streams")
 
     def number(self, name: str) -> int:
         """The number of a source or path name; a new one is written down."""
@@ -55,8 +56,10 @@ class Sources:
             cell = choosing.cell_of(self.memory.address, stream, address[1], KINDS.index(kind))
             if cell >= 0:
                 return cell
-            for field in ("most_streams",) if stream < 0 else ("width", "most_cells"):
-                self.memory.grow(field)
+            if stream < 0:
+                self.memory.grow("most_streams")
+            else:
+                self.memory.grow("width" if address[1] >= self.memory["width"] else "most_cells")
 
     def _descend(self, path: Sequence[str], name: str, kind: str) -> int:
         at = -1

@@ -30,7 +30,7 @@ from planners.query.choosing import (
 )
 from planners.query.header import copy_reals, header_at, load_int, load_real, store_int, store_real
 
-CALLED = "1d5b7464d93f"
+CALLED = "10f5e7070bce"
 
 _U, _ONE = np.uint64, np.uint64(1)
 _CANCEL = 0.25  # of the pair mutations move all of one value to another

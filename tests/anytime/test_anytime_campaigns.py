@@ -300,5 +300,8 @@ def test_the_command_resumes_and_tells_what_is_left_out(tmp_path, capsys):
     held = (tmp_path / "kept" / "slow.runs").read_bytes()
     assert main([*asked, "--seconds", "0.05", "--resume", "--executor", "processes:2"]) == 0
     assert (tmp_path / "kept" / "slow.runs").read_bytes().startswith(held)
+    kept = (tmp_path / "kept" / "slow.runs").read_bytes()
     assert main([*asked, "--executor", "moon"]) == 2
     assert "executor 'moon'; give serial" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "kept").glob("*.runs*")] == ["slow.runs"]
+    assert (tmp_path / "kept" / "slow.runs").read_bytes() == kept  # what it was asked lost nothing

@@ -74,6 +74,24 @@ def test_problems_that_are_none_are_refused_in_one_line(tmp_path, capsys):
     assert not kept.exists()
 
 
+@pytest.mark.parametrize("command", ["profile", "calibrate"])
+@pytest.mark.parametrize("problems", ["5", "(1 / 0 for _ in range(2))", "[].of_theirs"])
+def test_problems_that_fail_are_told_in_one_line(tmp_path, capsys, command, problems):
+    file = tmp_path / f"failing_{command}_{len(problems)}.py"
+    file.write_text(
+        "import anytime\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def see(image):\n"
+        "    yield 0.5\n"
+        f"def problems(rng): return {problems}\n"
+    )
+    library = ["--library", str(tmp_path / "profiles")]
+    assert main([command, f"{file}:see", "--problems", f"{file}:problems", *library]) == 2
+    told = capsys.readouterr().err
+    assert f"{file}:problems: " in told
+    assert len(told.splitlines()) == 1
+
+
 def test_a_folder_with_nothing_to_draw_is_refused(tmp_path, capsys):
     pictures = tmp_path / "pictures"
     assert main(["plot", str(tmp_path), "-o", str(pictures)]) == 2

@@ -98,6 +98,22 @@ def test_a_module_of_more_results_than_a_recording_keeps_takes_what_it_took():
         assert activity.ratios["look"] == pytest.approx(1.0, abs=0.05)
 
 
+def test_steps_that_grow_are_no_faster_machine():
+    @anytime.module(quality=lambda seen: seen, name="look")
+    def growing(image):
+        for step in range(1, 101):
+            anytime.charge(step)
+            yield image * step / 100
+
+    machine = MACHINE.with_rate("look", 0.0001)
+    scenes = [Scene(float(image)) for image in np.linspace(0.7, 1.0, 6)]
+    library = anytime.measure(growing, scenes, seconds=1.0, clock=lambda: WorkClock(machine))
+    with compiler.compile(growing, library).start(clock=WorkClock(machine)) as activity:
+        for _ in range(20):
+            activity.run(0.15, image=0.9)
+        assert not activity.drift
+
+
 def test_a_module_that_has_become_slower_is_noticed_and_time_divided_anew():
     activity = STEER.start(clock=WorkClock(SLOWED))
     for _ in range(30):

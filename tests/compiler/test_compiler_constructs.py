@@ -431,6 +431,11 @@ def python_and(light):
     return day(light) and night(light)
 
 
+def beside_with_deadlines(light):
+    one, other = compiler.parallel(day(light), night(light), processors=1)
+    return compiler.output(one, deadline=0.03), compiler.output(other, deadline=0.02)
+
+
 def cut_in_two(light):
     one, other = compiler.parallel(day(light), night(light))
     return join(compiler.branch(dark(light), one, smooth(light), chance=0.5), other)
@@ -450,6 +455,7 @@ def cut_in_two(light):
         (impossible_chance, r"chance=1\.5; give a number in \[0, 1\]"),
         (no_processor, r"processors=0; give 1 or more"),
         (python_and, r"use compiler\.branch for if, all_of for and, any_of for or"),
+        (beside_with_deadlines, r"deadlines of their own share a parallel"),
         (cut_in_two, r"use all results of a parallel in the same arm"),
     ],
 )

@@ -88,6 +88,26 @@ def test_results_that_a_recording_left_out_count_as_evenly_spread():
     assert steps_of(few).median == pytest.approx(steps_of(whole).median)
 
 
+def test_a_step_without_a_result_is_part_of_the_next():
+    @anytime.module(name="see")
+    def now_and_then():
+        for value in (0.5, None, 1.0):
+            anytime.charge(1)
+            yield value
+
+    steps = steps_of(recorded([1, 3]))
+    result, _ = execute(
+        now_and_then, (), Deadline(WorkClock(MACHINE), 3.0), may_step=last_guard(steps, 3.0)
+    )
+    assert result.value == 1.0
+
+
+def test_the_last_step_of_a_run_may_find_that_nothing_is_left_to_do():
+    run = recorded([1, 2])
+    ended = replace(run, recordings=(replace(run.recordings[0], end=(6.0, 6.0)),))
+    assert steps_of(ended).median == pytest.approx((1.0, 1.0, 4.0))
+
+
 def test_a_last_call_that_can_be_ended_between_results_is_not_held_to_them():
     searched = recorded([1, 6], [1, 7])
     some = (replace(run, steps=12) for run in searched.recordings)
@@ -105,14 +125,14 @@ def test_without_a_profile_there_is_no_guard():
 
 def test_the_last_call_begins_no_step_that_is_known_to_be_too_long():
     ladder = Steps((1.0, 2.0, 4.0, 8.0), (1.5, 3.0, 6.0, 12.0))
-    for ends, count in ((1.0, 1), (2.9, 1), (3.0, 2), (6.9, 2), (7.0, 3), (14.9, 3), (15.0, 4)):
+    for ends, count in ((1.0, 1), (3.9, 1), (4.0, 2), (8.9, 2), (9.0, 3), (18.9, 3), (19.0, 4)):
         assert results(last_guard(ladder, ends), hard=ends) == count
 
 
-def test_it_goes_by_the_pace_of_the_run_after_its_first_step():
-    slow = (1, 4, 8, 16)  # twice as long as usual, but for the first step
-    assert results(last_guard(STEADY, 12.0), slow, hard=12.0) == 2
-    assert results(last_guard(STEADY, 13.0), slow, hard=13.0) == 3
+def test_steps_may_take_longer_for_who_has_been_slower_than_nearly_all():
+    slow = (3, 6, 12)  # twice as long as the longest usual steps
+    assert results(last_guard(STEADY, 8.9), slow, hard=8.9) == 1
+    assert results(last_guard(STEADY, 9.0), slow, hard=9.0) == 2
 
 
 def test_beyond_the_steps_that_are_known_it_goes_by_those_of_the_run():

@@ -44,6 +44,13 @@ def test_a_map_that_is_written_is_read_back(tmp_path, kinds, resolution, origin)
     assert read_map(tmp_path / "plan.yaml") == grid
 
 
+def test_the_name_of_a_file_may_be_long_and_have_spaces(tmp_path):
+    place = tmp_path / ("the second floor of a building in the street " * 3 + ".yaml")
+    grid = GridMap(np.array([[True, False]]), name=place.stem)
+    write_ros_map(grid, place)
+    assert read_map(place) == grid
+
+
 def test_black_is_blocked_grey_unknown_white_free(tmp_path):
     grid = read_map(write(tmp_path))
     assert grid.free.tolist() == [[False, False, True]]

@@ -199,6 +199,13 @@ def test_whatever_is_heard_the_map_stays_finite_and_the_discs_sensible(
     assert ((found[:, 2] > 0.05) & (found[:, 2] < 0.3)).all()
 
 
+@given(st.floats(-20, 20), st.floats(-20, 20))
+@settings(max_examples=20, deadline=None)
+def test_a_map_that_is_shifted_far_has_its_middle_there(x, y):
+    xs, ys = np.meshgrid(*heard(AHEAD, [HERE]).centred(x, y, within=0.0).places())
+    assert math.hypot(xs.mean() - x, ys.mean() - y) < 0.06
+
+
 @given(st.floats(-5, 5), st.floats(-5, 5))
 @settings(max_examples=10, deadline=None)
 def test_a_map_that_is_shifted_keeps_what_stays_on_it(x, y):

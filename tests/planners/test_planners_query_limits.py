@@ -1,0 +1,178 @@
+"""Optimisation queries at their limits: long plans, many sources, what is impossible, bad input."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from anytime import AnytimeError
+from planners import query
+from planners.query import Query, native
+
+
+@query.model
+def long(rng):
+    total = 0.0
+    while rng.flip("more", 0.5):
+        total += rng.gaussian("leg")
+    return abs(total - 3.0)
+
+
+@query.model
+def seventeen(rng):
+    total = rng.gaussian("a") + rng.gaussian("b") + rng.gaussian("c") + rng.gaussian("d")
+    total += rng.gaussian("e") + rng.gaussian("f") + rng.gaussian("g") + rng.gaussian("h")
+    total += rng.gaussian("i") + rng.gaussian("j") + rng.gaussian("k") + rng.gaussian("l")
+    total += rng.gaussian("m") + rng.gaussian("n") + rng.gaussian("o") + rng.gaussian("p")
+    return abs(total + rng.gaussian("q") - 4.0)
+
+
+@query.model
+def beyond(rng, w):
+    return w.a[rng.randint("i", 50)]
+
+
+@query.model
+def sure(rng):
+    count = 0.0
+    for _ in range(5):
+        if rng.flip("never", 0.0):
+            count += 1.0
+        if not rng.flip("always", 1.0):
+            count += 1.0
+    return -count
+
+
+@query.model
+def guarded(rng):
+    x = rng.uniform("x", 0.0, 10.0)
+    if 7.0 < x < 7.0001:
+        raise ValueError("off the table")
+    return x
+
+
+@query.model
+def huge(rng):
+    return float(rng.randint("i", 4294967297))
+
+
+@query.model
+def narrow(rng, w):
+    return rng.gaussian("g", 0.0, w.sigma)
+
+
+@query.model
+def endless(rng, w):
+    return rng.uniform("u", 0.0, w.most)
+
+
+def legs(count):
+    chosen = {("more", place): True for place in range(count)} | {("more", count): False}
+    return chosen | {("leg", place): 1.0 for place in range(count)}
+
+
+@pytest.mark.parametrize("count", [10, 60, 500])
+@pytest.mark.parametrize("is_native", [False, True])
+def test_a_plan_has_its_value_however_long_it_is(count, is_native):
+    searched = Query(long, seed=1, native=is_native)
+    searched.step(3)
+    assert searched.value_of(legs(count)) == long.replay(legs(count))
+
+
+def test_a_plan_beyond_every_table_is_worth_nothing():
+    searched = Query(long, seed=1)
+    searched.step()
+    assert searched.value_of(legs(5000)) == math.inf
+
+
+def test_a_long_plan_that_is_suggested_is_taken_up():
+    searched = Query(long, seed=1)
+    searched.step(3)
+    perfect = legs(60) | {("leg", place): 0.05 for place in range(60)}
+    searched.suggest(perfect)
+    assert searched.value == pytest.approx(0.0, abs=1e-9)
+    assert dict(searched.best.choices) == perfect
+
+
+def test_what_is_not_given_is_drawn_and_not_kept_from_before():
+    searched = Query(long, seed=1)
+    searched.step(2)
+    before = searched.value_of({})
+    searched.value_of({("more", 0): True, ("leg", 0): 123.0, ("more", 1): False})
+    assert searched.value_of({}) == before
+
+
+@pytest.mark.parametrize("is_native", [False, True])
+def test_a_model_may_have_any_number_of_sources(is_native):
+    searched = Query(seventeen, seed=1, native=is_native)
+    searched.step(5)
+    assert seventeen.replay(searched.best.choices) == searched.value
+
+
+def test_an_index_beyond_an_array_of_the_world_is_an_error():
+    with pytest.raises(IndexError):
+        Query(beyond, {"a": np.array([1.0, 2.0, 3.0])}, seed=1).step(6)
+
+
+def test_what_is_impossible_is_never_chosen():
+    searched = Query(sure, seed=1)
+    searched.step(30)
+    assert searched.value == 0.0
+
+
+def test_a_model_that_raises_leaves_constraints_in_force():
+    searched = Query(guarded, seed=1)
+    searched.step(3)
+    searched.constrain({("x", 0): 4.0})
+    searched.step(2)
+    with pytest.raises(ValueError, match="off the table"):
+        searched.value_of({("x", 0): 7.00005})
+    searched.step(3)
+    assert searched.best.choices["x", 0] == 4.0
+
+
+def test_what_is_suggested_keeps_to_the_constraints():
+    searched = Query(long, seed=1)
+    searched.step(3)
+    searched.constrain({("more", 0): False})
+    searched.step(2)
+    searched.suggest({("more", 0): True, ("leg", 0): 3.0, ("more", 1): False})
+    assert searched.best.choices["more", 0] is False
+
+
+@pytest.mark.parametrize(
+    ("model", "world", "says"),
+    [
+        (huge, None, r"n from 1 to 2\*\*32"),
+        (narrow, {"sigma": -1.0}, "sigma < 0"),
+        (narrow, {"sigma": math.nan}, "sigma < 0"),
+        (endless, {"most": math.inf}, "without end"),
+    ],
+)
+def test_parameters_that_mean_nothing_are_refused(model, world, says):
+    with pytest.raises(ValueError, match=says):
+        Query(model, world, seed=1).step()
+
+
+@pytest.mark.parametrize(
+    "address", [("q/1/leg", 0), ("q/leg", 0), ("q/x/leg", 0), ("leg", -1), ("leg", 10**6), ("no", 0)]
+)
+def test_an_address_that_was_never_asked_for_is_refused(address):
+    searched = Query(long, seed=1)
+    searched.step()
+    for refuse in (searched.constrain, searched.suggest, searched.value_of):
+        with pytest.raises(AnytimeError, match="has no choice"):
+            refuse({address: 1.0})
+
+
+def test_a_value_to_reach_is_a_number():
+    with pytest.raises(AnytimeError, match="give numbers"):
+        Query(long, seed=1).run(until=math.nan)
+
+
+def test_constants_of_another_shape_or_type_are_other_code():
+    ones = np.ones(4)
+    marks = {native._bytes(each) for each in (ones, ones.reshape(2, 2), ones.view(np.int64))}
+    assert len(marks) == 3
