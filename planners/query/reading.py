@@ -199,6 +199,15 @@ class _Checker(ast.NodeTransformer):
             self._choice(node, method)
         return self.generic_visit(node)
 
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        of_world = any(isinstance(part, ast.Attribute) for part in ast.walk(node.value))
+        if isinstance(node.ctx, ast.Store) and of_world:
+            raise NativeError(
+                f"{self.file}:{node.lineno}: {self.name}: {ast.unparse(node)} is changed; the "
+                "world is the same for every run: change a copy"
+            )
+        return self.generic_visit(node)
+
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         if not self._is_module(node.value) or not isinstance(node.value, ast.Name):
             return self.generic_visit(node)

@@ -35,6 +35,19 @@ def beyond(rng, w):
 
 
 @query.model
+def careless(rng, w):
+    w.a[0] += rng.gaussian("x")
+    return w.a[0]
+
+
+@query.model
+def careful(rng, w):
+    a = w.a.copy()
+    a[0] += rng.gaussian("x")
+    return a[0]
+
+
+@query.model
 def sure(rng):
     count = 0.0
     for _ in range(5):
@@ -116,6 +129,16 @@ def test_an_index_beyond_an_array_of_the_world_is_an_error():
         Query(beyond, {"a": np.array([1.0, 2.0, 3.0])}, seed=1).step(6)
 
 
+def test_a_model_changes_no_world():
+    world = {"a": np.array([1.0, 2.0, 3.0])}
+    with pytest.raises(AnytimeError, match=r"w\.a\[0\] is changed; .*change a copy"):
+        Query(careless, world, seed=1)
+    searched = Query(careful, world, seed=1)
+    searched.step(5)
+    assert searched.world["a"][0] == 1.0
+    assert careful.replay(searched.best.choices, world) == searched.value
+
+
 def test_what_is_impossible_is_never_chosen():
     searched = Query(sure, seed=1)
     searched.step(30)
@@ -157,7 +180,8 @@ def test_parameters_that_mean_nothing_are_refused(model, world, says):
 
 
 @pytest.mark.parametrize(
-    "address", [("q/1/leg", 0), ("q/leg", 0), ("q/x/leg", 0), ("leg", -1), ("leg", 10**6), ("no", 0)]
+    "address",
+    [("q/1/leg", 0), ("q/leg", 0), ("q/x/leg", 0), ("leg", -1), ("leg", 10**6), ("no", 0)],
 )
 def test_an_address_that_was_never_asked_for_is_refused(address):
     searched = Query(long, seed=1)
