@@ -17,7 +17,7 @@ from anytime.programs import Program
 from anytime.structure import outermost, outlets, within
 from compiler import costs
 from compiler.division import Frontier
-from compiler.elimination import SUM_PRODUCT, Factor, eliminate
+from compiler.elimination import SUM_PRODUCT, Factor, eliminate, order_of
 from compiler.tables import Table
 
 Floats = NDArray[np.float64]
@@ -75,7 +75,7 @@ class Block:
             else:
                 factors.append(Factor((*table.feeds, table.label), table.chances[..., 0, :]))
         kept = (*self.feeds, DIVISION, *self.outside)
-        return eliminate(factors, kept, SUM_PRODUCT)[0].table
+        return eliminate(factors, order_of(factors, kept), SUM_PRODUCT)[0].table
 
     def thinned(self, count: int) -> Block:
         """With at most so many of its divisions, from the first to the last."""

@@ -19,6 +19,7 @@ from compiler.elimination import (
     Factor,
     all_cheapest_levels,
     eliminate,
+    order_of,
     times_to_levels,
 )
 from compiler.objectives import EXPECTED, Objective
@@ -158,7 +159,8 @@ def output_chances(tables: Sequence[Table], moments: Sequence[int]) -> Floats:
         Factor((*table.feeds, table.label), table.chances[..., moment, :])
         for table, moment in zip(tables, moments, strict=True)
     ]
-    return eliminate(factors, (tables[-1].label,), SUM_PRODUCT)[0].table
+    order = order_of(factors, (tables[-1].label,))
+    return eliminate(factors, order, SUM_PRODUCT)[0].table
 
 
 def expected_quality(tables: Sequence[Table], moments: Sequence[int]) -> float:
@@ -191,7 +193,7 @@ def _weighed(
         factors.append(Factor(scope, chances))
     kept = tuple(f"time {place}" for place in free)
     result = kept if mean else (*kept, tables[-1].label)
-    values = eliminate(factors, result, SUM_PRODUCT)[0].table
+    values = eliminate(factors, order_of(factors, result), SUM_PRODUCT)[0].table
     rows = np.indices(tuple(len(tables[place].times) for place in free)).reshape(len(free), -1)
     moments = np.tile(np.asarray(fixed, dtype=np.intp), (rows.shape[1], 1))
     moments[:, list(free)] = rows.T

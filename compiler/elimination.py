@@ -47,36 +47,42 @@ SUM_PRODUCT = Semiring(np.multiply, np.add)
 class Step:
     """One elimination: in which order and from which tables, for walking back down.
 
-    tables: of the factors given, then the one that each bucket of the order left behind. Joined
-    tables are not kept: a walk looks at one row of each table for every variable.
+    tables: of the factors given, then the one that each bucket of the order left behind, or a row
+    of several of which `order.parts` says the part. Joined tables are not kept: a walk looks at
+    one row of each table for every variable.
     """
 
     order: Order
     tables: tuple[Floats, ...]
 
+    def table(self, number: int) -> Floats:
+        """That of the factor of this number."""
+        part = self.order.parts.get(number)
+        return self.tables[number] if part is None else self.tables[number][part]
+
 
 def eliminate(
-    factors: Sequence[Factor], keep: Sequence[str], semiring: Semiring
+    factors: Sequence[Factor], order: Order, semiring: Semiring
 ) -> tuple[Factor, tuple[Step, ...]]:
-    """Sum out every variable but `keep`, in a cheap order. [Dec99]
+    """Sum out every variable that the order does not keep. [Dec99]
 
-    Returns the factor over `keep`, in that order, and a step for `cheapest_levels`; steps of
+    order: of these factors or of others with the same scopes and levels, by `order_of`.
+    Returns the factor over what is kept, in that order, and a step for `cheapest_levels`; steps of
     eliminations that follow each other are put together in that order.
     """
-    order = order_of(factors, keep)
     tables = [factor.table for factor in factors]
     machine_code = _machine_code if semiring is MIN_PLUS else None
     for buckets, start, numbers, parts in order.stages:
         if machine_code is not None and parts:
             along = tuple([tables[number] for number in numbers])
             left = machine_code.least_sums_along(tables[start], along, len(parts))
-            tables += [left[part] for part in parts]
+            tables += [left] * (len(parts) - 1)
+            tables.append(left[parts[-1]])
             continue
         for bucket in buckets:
             tables.append(_left_behind(bucket, tables, order.scopes, semiring, machine_code))
-    kept = tuple(keep)
-    rest = [_aligned(tables[number], order.scopes[number], kept) for number in order.left]
-    return Factor(kept, _joined(rest, semiring)), (Step(order, tuple(tables)),)
+    rest = [_aligned(tables[number], order.scopes[number], order.keep) for number in order.left]
+    return Factor(order.keep, _joined(rest, semiring)), (Step(order, tuple(tables)),)
 
 
 def _left_behind(
@@ -98,7 +104,7 @@ def _left_behind(
 
 
 def order_of(factors: Sequence[Factor], keep: Sequence[str]) -> Order:
-    """The order in which `eliminate` sums out, and what that costs."""
+    """A cheap order in which `eliminate` sums out every variable but `keep`, and its costs."""
     scopes = tuple([factor.scope for factor in factors])
     return elimination_order(scopes, tuple([f.table.shape for f in factors]), tuple(keep))
 
@@ -115,7 +121,7 @@ def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> 
     count = max((len(each) for each in levels.values()), default=1)
     for step, bucket in [(s, b) for s in reversed(steps) for b in reversed(s.order.buckets)]:
         if _machine_code is not None and bucket.blocks is not None:
-            one, other = (step.tables[number] for number in bucket.members)
+            one, other = (step.table(number) for number in bucket.members)
             places = np.zeros(count, np.intp)
             for name, size in zip(bucket.scope, bucket.shape[1:], strict=True):
                 places = places * size + levels[name]
@@ -126,7 +132,7 @@ def all_cheapest_levels(steps: Sequence[Step], chosen: Mapping[str, Levels]) -> 
         for number in bucket.members:
             scope = step.order.scopes[number]
             index = tuple([levels[name] for name in scope if name != bucket.variable])
-            table = np.moveaxis(step.tables[number], scope.index(bucket.variable), -1)[index]
+            table = np.moveaxis(step.table(number), scope.index(bucket.variable), -1)[index]
             costs = table if costs is None else costs + table
         assert costs is not None  # a bucket has members
         levels[bucket.variable] = np.broadcast_to(costs.argmin(axis=-1), (count,))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from compiler.costs import joined
-from compiler.elimination import MIN_PLUS, Factor, Step, eliminate
+from compiler.elimination import MIN_PLUS, Factor, Step, eliminate, order_of
 from compiler.solving import Solution, cheapest
 from compiler.tables import Table
 
@@ -55,7 +55,7 @@ def _reduced(
             own = {table.label for table in arm}
             scope = sorted({name for factor in found for name in factor.scope})
             keep = tuple(name for name in scope if name not in own or name in wanted)
-            side, last = eliminate(found, keep, MIN_PLUS)
+            side, last = eliminate(found, order_of(found, keep), MIN_PLUS)
             sides.append(side)
             steps += (*deeper, *last)
         plain.append(_beside(sides, processors[group]))

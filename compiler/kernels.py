@@ -41,7 +41,8 @@ def _least(costs: Floats, table: Floats, least: Floats) -> None:
             total = total if total < total1 else total1
             total2 = total2 if total2 < total3 else total3
             total = total if total < total2 else total2
-            least[b] = total if total < least[b] else least[b]
+            before = least[b]
+            least[b] = total if total < before else before
     for v in range(levels - levels % 4, levels):
         cost = costs[v]
         row = table[v]

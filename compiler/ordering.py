@@ -14,7 +14,7 @@ import numpy as np
 
 EASY = 1e6  # cells of the largest table up to which a better order is not looked for
 TRIES = 40  # random orders, beyond that
-ALONG = 12  # tables that machine code goes through at one call, at most
+ALONG = 20  # tables that machine code goes through at one call, at most
 
 Scope = tuple[str, ...]
 
@@ -54,13 +54,16 @@ class Stage(NamedTuple):
 class Order:
     """Buckets in the order of elimination, and the same in stages.
 
-    scopes: of all factors, those that buckets leave behind included. left: numbers of the factors
-    that are left at the end. cells: of the largest joined table; all_cells: of all of them, to
-    which the time is in proportion. [Dec99]
+    keep: variables that are kept, in that order. parts: where in the row of its stage a factor
+    lies that only the next bucket there asks for, by number. scopes: of all factors, those that
+    buckets leave behind included. left: numbers of the factors that are left at the end. cells: of
+    the largest joined table; all_cells: of all of them, to which the time is in proportion. [Dec99]
     """
 
+    keep: Scope
     buckets: tuple[Bucket, ...]
     stages: tuple[Stage, ...]
+    parts: Mapping[int, slice]
     scopes: tuple[Scope, ...]
     left: tuple[int, ...]
     cells: float
@@ -176,7 +179,9 @@ def _greedy(
     left = tuple([number for number in range(len(scopes)) if number not in used])
     cells = [prod(bucket.shape) for bucket in buckets]
     stages = _stages(buckets, scopes)
-    return Order(tuple(buckets), stages, tuple(scopes), left, max(cells, default=1), sum(cells))
+    parts = _parts(stages, len(scopes) - len(buckets))
+    most, every = max(cells, default=1), sum(cells)
+    return Order(keep, tuple(buckets), stages, parts, tuple(scopes), left, most, every)
 
 
 def _stages(buckets: Sequence[Bucket], scopes: Sequence[Scope]) -> tuple[Stage, ...]:
@@ -206,6 +211,15 @@ def _stage(row: Sequence[Bucket]) -> Stage:
     parts = tuple([slice(*pair) for pair in itertools.pairwise(ends)])
     padded = (*tables, *tables[-1:] * (ALONG - len(tables)))
     return Stage(tuple(row), row[0].members[0], padded, parts)
+
+
+def _parts(stages: Sequence[Stage], number: int) -> dict[int, slice]:
+    """number: of the factor that the first bucket leaves behind."""
+    parts: dict[int, slice] = {}
+    for stage in stages:
+        parts |= dict(enumerate(stage.parts[:-1], number))
+        number += len(stage.buckets)
+    return parts
 
 
 def _bucket(

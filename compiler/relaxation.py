@@ -105,7 +105,8 @@ class Relaxation:
 
     def eliminated(self) -> dict[str, int]:
         """The cheapest levels of those that are left, by elimination."""
-        _, steps = eliminate(self._factors(), (), MIN_PLUS)
+        factors = self._factors()
+        _, steps = eliminate(factors, order_of(factors, ()), MIN_PLUS)
         found = cheapest_levels(steps, {})
         return {name: int(self.alive[name][number]) for name, number in found.items()}
 

@@ -71,8 +71,9 @@ def cheapest(factors: Sequence[Factor], output: str, cells: float = CELLS) -> So
     elimination while the largest joined table has at most `cells` cells; beyond, one level of the
     output after the other by branch and bound on the relaxation, which is nearly always exact too.
     """
-    if order_of(factors, (output,)).cells <= cells:
-        costs, steps = eliminate(factors, (output,), MIN_PLUS)
+    order = order_of(factors, (output,))
+    if order.cells <= cells:
+        costs, steps = eliminate(factors, order, MIN_PLUS)
         return Solution(output, costs.table, costs.table, steps, "elimination")
     count = next(
         size

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from compiler.certificates import Response, bracketed, ceiling_factor, floor_factor
 from compiler.division import divide
-from compiler.elimination import MIN_PLUS, Factor, Levels, eliminate, warm_up
+from compiler.elimination import MIN_PLUS, Factor, Levels, eliminate, order_of, warm_up
 from compiler.solving import cheapest
 from compiler.tables import Table
 from experiments.benchmarks import compiler_programs as programs
@@ -79,11 +79,12 @@ def races(rng: np.random.Generator, settings: dict[str, object], limit: float) -
     profiles = programs.stepped(rng, CALLS, LEVELS, STEPS)
     feeds = programs.chain(CALLS)
     factors = programs.factors_of(feeds, programs.chain_tables(profiles, LEVELS))
-    output = factors[-1].scope[-1]
+    order = order_of(factors, factors[-1].scope[-1:])
     further, first = np.stack(profiles[1:]), profiles[0]
     small, small_first = further.astype(np.uint8), first.astype(np.uint8)
     tree = programs.binary(4)
     trees = programs.factors_of(tree, programs.smooth(rng, tree, LEVELS, STEPS))
+    binary = order_of(trees, trees[-1].scope[-1:])
     renamed = [
         programs.factors_of(feeds, [factor.table for factor in factors], f"again {number}")
         for number in range(400)
@@ -92,20 +93,20 @@ def races(rng: np.random.Generator, settings: dict[str, object], limit: float) -
 
     def ours_new() -> object:
         one: list[Factor] = next(new)
-        return eliminate(one, one[-1].scope[-1:], MIN_PLUS)
+        return eliminate(one, order_of(one, one[-1].scope[-1:]), MIN_PLUS)
 
     took = interleaved(
         rng,
         {
-            "ours": lambda: eliminate(factors, (output,), MIN_PLUS),
+            "ours": lambda: eliminate(factors, order, MIN_PLUS),
             "new": ours_new,
             "forward": lambda: rivals.forward(further, first),
             "rows": lambda: rivals.forward_by_rows(small, small_first),
-            "binary": lambda: eliminate(trees, (trees[-1].scope[-1],), MIN_PLUS),
+            "binary": lambda: eliminate(trees, binary, MIN_PLUS),
         },
         REPEATS,
     )
-    costs = eliminate(factors, (output,), MIN_PLUS)[0].table
+    costs = eliminate(factors, order, MIN_PLUS)[0].table
     figures: Figures = {
         **median_interval("vs_forward", took["forward"] / took["ours"]),
         **median_interval("vs_forward_new", took["forward"] / took["new"]),

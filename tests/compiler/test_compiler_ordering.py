@@ -45,7 +45,7 @@ def test_a_long_chain_is_eliminated_in_the_order_of_its_calls():
     found = order(scopes, ("99",))
     assert [bucket.variable for bucket in found.buckets] == [str(place) for place in range(99)]
     assert found.cells == 16
-    assert [len(stage.buckets) for stage in found.stages] == [12] * 8 + [3]
+    assert [len(stage.buckets) for stage in found.stages] == [20] * 4 + [19]
     assert [bucket for stage in found.stages for bucket in stage.buckets] == [*found.buckets]
 
 

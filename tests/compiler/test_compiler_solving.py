@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from compiler import elimination, solving
 from compiler.climbing import climbed, cost_of
-from compiler.elimination import MIN_PLUS, SUM_PRODUCT, Factor, all_cheapest_levels, eliminate
+from compiler.elimination import (
+    MIN_PLUS,
+    SUM_PRODUCT,
+    Factor,
+    all_cheapest_levels,
+    eliminate,
+    order_of,
+)
 from compiler.relaxation import Relaxation
 from compiler.solving import Solution, cheapest
 
@@ -133,7 +140,7 @@ def test_machine_code_gives_the_same_bits_and_walks_the_same_ways(program):
     factors, output = program
 
     def found(semiring):
-        costs, steps = eliminate(factors, (output,), semiring)
+        costs, steps = eliminate(factors, order_of(factors, (output,)), semiring)
         return costs.table, all_cheapest_levels(steps, {output: np.arange(len(costs.table))})
 
     for semiring in (MIN_PLUS, SUM_PRODUCT):
@@ -167,10 +174,10 @@ def test_machine_code_goes_along_a_chain_of_unequal_tables_with_the_same_bits(
     wanted = {output: np.arange(sizes[-1])}
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(elimination, "_machine_code", None)
-        plain, steps = eliminate(factors, (output,), MIN_PLUS)
+        plain, steps = eliminate(factors, order_of(factors, (output,)), MIN_PLUS)
         ways = all_cheapest_levels(steps, wanted)
         elimination.warm_up()
-        warm, warm_steps = eliminate(factors, (output,), MIN_PLUS)
+        warm, warm_steps = eliminate(factors, order_of(factors, (output,)), MIN_PLUS)
         warm_ways = all_cheapest_levels(warm_steps, wanted)
     assert np.array_equal(warm.table, plain.table)
     assert all(np.array_equal(warm_ways[name], ways[name]) for name in ways)
@@ -184,7 +191,7 @@ def test_large_tables_are_joined_in_pieces_with_the_same_result():
         Factor(("a", "d"), rng.random((20, 23))),
         Factor(("a", "c", "d"), rng.random((20, 22, 23))),
     ]
-    found = eliminate(factors, ("b", "c", "d"), MIN_PLUS)[0].table
+    found = eliminate(factors, order_of(factors, "bcd"), MIN_PLUS)[0].table
     one, other, third, fourth = (factor.table for factor in factors)
     joined = (
         one[:, None, None, None]
@@ -198,5 +205,6 @@ def test_large_tables_are_joined_in_pieces_with_the_same_result():
 @pytest.mark.parametrize("semiring", [MIN_PLUS, SUM_PRODUCT], ids=["(min, +)", "(+, ×)"])
 def test_a_variable_of_very_many_levels_is_summed_out(semiring):
     cells = np.random.default_rng(0).random(3 * elimination.PIECE)
-    found = eliminate([Factor(("a",), cells)], (), semiring)[0].table
+    factors = [Factor(("a",), cells)]
+    found = eliminate(factors, order_of(factors, ()), semiring)[0].table
     assert found == pytest.approx(semiring.total.reduce(cells))
