@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ Floats = NDArray[np.float64]
 
 LAGS = (0.0125, 0.0375, 0.1, 0.25)  # shares of the times over which slopes are taken
 WINDOW = 0.25  # share of the times at either side that is pooled
-RIDGE, RIDGE_OF_VALUES = 0.1, 0.2  # of standardised features, times the number of runs
+RIDGE, RIDGE_OF_VALUES = 0.5, 0.2  # of standardised features, times the number of runs
 
 
 def true_of_seen(runs: Runs) -> tuple[float, float]:
@@ -22,36 +24,15 @@ def true_of_seen(runs: Runs) -> tuple[float, float]:
     return float(quality.mean() - slope * seen.mean()), slope
 
 
-def regression(runs: Runs, task: Task) -> StoppingRule:
-    """Regress what going on was worth on what was seen, backwards in time, and stop at ≤ 0.
+def blended(runs: Runs, task: Task) -> StoppingRule:
+    """Stop when `forecast` and `regression` on average expect nothing of going on.
 
-    Least-squares Monte Carlo (Longstaff & Schwartz 2001), with a ridge because runs are few.
+    From a few dozen runs each learns errors of its own, and half of them cancel. The regression is
+    on what runs were worth that this very average stops.
     """
     features = _Features(runs)
-    seen, utilities = features.of_runs(runs), runs.utilities(task)
-    count = len(runs.seconds)
-    beyond = np.zeros(len(runs))
-    models: list[tuple[Floats, Floats]] = []
-    for index in range(count - 2, -1, -1):
-        gain = utilities[:, index + 1] - utilities[:, index] - task.look + beyond
-        rows = np.column_stack([np.ones(len(runs)), seen[:, index]])
-        base, slopes = _ridge(rows.T @ rows, rows.T @ gain[:, None], RIDGE_OF_VALUES)
-        models.append((base, slopes))
-        beyond = np.where((base + seen[:, index] @ slopes)[:, 0] > 0, gain, 0.0)
-    models.reverse()
-
-    def rule(history: History) -> float | Stop:
-        if not len(history.seconds):
-            return until(0.0, float(runs.seconds[0]))
-        index, now = features.now(history)
-        if index >= len(models):
-            return STOP
-        base, slopes = models[index]
-        if float((base + now @ slopes)[0]) <= 0:
-            return STOP
-        return until(float(history.seconds[-1]), float(runs.seconds[index + 1]))
-
-    return rule
+    other = _by_forecast(runs, task, features)
+    return _rule(runs, features, _by_values(runs, task, features, other))
 
 
 def forecast(runs: Runs, task: Task) -> StoppingRule:
@@ -62,30 +43,71 @@ def forecast(runs: Runs, task: Task) -> StoppingRule:
     gains are a smoother thing to learn, so that neighbouring times can be pooled. It also sees for
     how long quality has not risen: runs have plateaus.
     """
-    features, count = _Features(runs), len(runs.seconds)
-    unit = float(np.median(np.diff(runs.seconds))) if count > 1 else 1.0
-    plateau = np.log1p(waited(runs.seconds, runs.seen) / unit)
-    seen = np.concatenate([features.of_runs(runs), plateau[:, :, None]], axis=2)
-    models = _gains(seen, runs.quality, max(1, round(WINDOW * count)))
-    intercept, slope = true_of_seen(runs)
+    features = _Features(runs)
+    return _rule(runs, features, _by_forecast(runs, task, features))
 
+
+def regression(runs: Runs, task: Task) -> StoppingRule:
+    """Regress what going on was worth on what was seen, backwards in time, and stop at ≤ 0.
+
+    Least-squares Monte Carlo (Longstaff & Schwartz 2001), with a ridge because runs are few.
+    """
+    features = _Features(runs)
+    return _rule(runs, features, _by_values(runs, task, features))
+
+
+Expectation = Callable[[int, Floats], Floats]
+"""What going on from the time of an index, not the last, is expected to be worth beyond stopping
+there, [N], by the features of runs at that time, [N, F]."""
+
+
+def _rule(runs: Runs, features: _Features, expected: Expectation) -> StoppingRule:
     def rule(history: History) -> float | Stop:
         if not len(history.seconds):
             return until(0.0, float(runs.seconds[0]))
         index, now = features.now(history)
-        if index >= len(models):
-            return STOP
-        base, slopes = models[index]
-        still = waited(history.seconds, history.quality[None])[0, -1]
-        now = np.append(now, np.log1p(still / unit))
-        quality = np.array(intercept + slope * history.quality[-1])
-        stay = task.utility(quality, runs.seconds[index])
-        go = task.utility(quality + base + now @ slopes, runs.seconds[index + 1 :])
-        if go.max() - task.look <= stay:
+        if index + 1 >= len(runs.seconds) or expected(index, now[None])[0] <= 0:
             return STOP
         return until(float(history.seconds[-1]), float(runs.seconds[index + 1]))
 
     return rule
+
+
+def _by_forecast(runs: Runs, task: Task, features: _Features) -> Expectation:
+    width = max(1, round(WINDOW * len(runs.seconds)))
+    models = _gains(features.of_runs(runs), runs.quality, width)
+    intercept, slope = true_of_seen(runs)
+
+    def expected(index: int, seen: Floats) -> Floats:
+        base, slopes = models[index]
+        quality = intercept + slope * seen[:, :1]
+        stay = task.utility(quality, runs.seconds[index])
+        go = task.utility(quality + base + seen @ slopes, runs.seconds[index + 1 :])
+        return (go - stay).max(axis=1) - task.look
+
+    return expected
+
+
+def _by_values(
+    runs: Runs, task: Task, features: _Features, other: Expectation | None = None
+) -> Expectation:
+    """other: whose expectations are averaged with these."""
+    seen, utilities = features.of_runs(runs), runs.utilities(task)
+    beyond = np.zeros(len(runs))
+    models: dict[int, tuple[Floats, Floats]] = {}
+
+    def expected(index: int, seen: Floats) -> Floats:
+        base, slopes = models[index]
+        own = (base + seen[:, :-1] @ slopes)[:, 0]
+        return own if other is None else (own + other(index, seen)) / 2
+
+    for index in range(len(runs.seconds) - 2, -1, -1):
+        gain = utilities[:, index + 1] - utilities[:, index] - task.look + beyond
+        # Without the plateau: values of a single time are too few to learn one thing more.
+        rows = np.column_stack([np.ones(len(runs)), seen[:, index, :-1]])
+        models[index] = _ridge(rows.T @ rows, rows.T @ gain[:, None], RIDGE_OF_VALUES)
+        beyond = np.where(expected(index, seen[:, index]) > 0, gain, 0.0)
+    return expected
 
 
 def _gains(seen: Floats, quality: Floats, width: int) -> list[tuple[Floats, Floats]]:
@@ -121,11 +143,13 @@ def _gains(seen: Floats, quality: Floats, width: int) -> list[tuple[Floats, Floa
 
 
 class _Features:
-    """What regressions see of a run: its quality, and its mean slopes over the last times."""
+    """What regressions see of a run: its quality, its mean slopes over the last times, and for how
+    long it has not risen."""
 
     def __init__(self, runs: Runs) -> None:
         self.seconds = runs.seconds
         count = len(runs.seconds)
+        self.unit = float(np.median(np.diff(runs.seconds))) if count > 1 else 1.0
         self.lags = np.unique(np.maximum(1, np.rint(np.array(LAGS) * count))).astype(int)
 
     def of_runs(self, runs: Runs) -> Floats:
@@ -134,7 +158,8 @@ class _Features:
         before = np.maximum(times[:, None] - self.lags, 0)
         over = np.maximum(times[:, None] - before, 1)
         slopes = (runs.seen[:, :, None] - runs.seen[:, before]) / over
-        return np.concatenate([runs.seen[:, :, None], slopes], axis=2)
+        plateau = np.log1p(waited(runs.seconds, runs.seen) / self.unit)
+        return np.concatenate([runs.seen[:, :, None], slopes, plateau[:, :, None]], axis=2)
 
     def now(self, history: History) -> tuple[int, Floats]:
         """(Index of the present time, [F])."""
@@ -143,7 +168,9 @@ class _Features:
         before = np.maximum(index - self.lags, 0)
         seen = history.quality[-1]
         then = np.interp(self.seconds[before], history.seconds, history.quality)
-        return index, np.append(seen, (seen - then) / np.maximum(index - before, 1))
+        slopes = (seen - then) / np.maximum(index - before, 1)
+        still = waited(history.seconds, history.quality[None])[0, -1]
+        return index, np.concatenate([[seen], slopes, [np.log1p(still / self.unit)]])
 
 
 def waited(seconds: Floats, seen: Floats) -> Floats:

@@ -18,7 +18,7 @@ from monitor.stopping import (
     Task,
     until,
 )
-from monitor.stopping_regressions import forecast, regression, true_of_seen
+from monitor.stopping_regressions import blended, forecast, regression, true_of_seen
 
 Floats = NDArray[np.float64]
 
@@ -163,6 +163,7 @@ def projection(runs: Runs, task: Task) -> StoppingRule:
 
 # The preferred first: what learns most from few runs. The fixed contract stands beside them always.
 LEARNERS: Mapping[str, Learner] = {
+    "blended": blended,
     "forecast": forecast,
     "regression": regression,
     "dynamic_programming": dynamic_programming,
