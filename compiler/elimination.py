@@ -48,16 +48,17 @@ class Step:
     """One elimination: in which order and from which tables, for walking back down.
 
     tables: of the factors given, then the one that each bucket of the order left behind, or a row
-    of several of which `order.parts` says the part. Joined tables are not kept: a walk looks at
-    one row of each table for every variable.
+    of several; parts: which part of it, by number. Joined tables are not kept: a walk looks at one
+    row of each table for every variable.
     """
 
     order: Order
     tables: tuple[Floats, ...]
+    parts: Mapping[int, slice]
 
     def table(self, number: int) -> Floats:
         """That of the factor of this number."""
-        part = self.order.parts.get(number)
+        part = self.parts.get(number)
         return self.tables[number] if part is None else self.tables[number][part]
 
 
@@ -82,7 +83,8 @@ def eliminate(
         for bucket in buckets:
             tables.append(_left_behind(bucket, tables, order.scopes, semiring, machine_code))
     rest = [_aligned(tables[number], order.scopes[number], order.keep) for number in order.left]
-    return Factor(order.keep, _joined(rest, semiring)), (Step(order, tuple(tables)),)
+    parts: Mapping[int, slice] = order.parts if machine_code is not None else {}
+    return Factor(order.keep, _joined(rest, semiring)), (Step(order, tuple(tables), parts),)
 
 
 def _left_behind(

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anytime.programs import makers
 from compiler import CompiledProgram
@@ -18,9 +20,11 @@ from monitor.policies import Expected, constant
 from monitor.reports import Report
 from monitor.rhythms import Lived, Rhythm, rhythm_of
 
+Floats = NDArray[np.float64]
 MakeRobot = Callable[[], Robot]
 RATIOS = 9  # quantiles kept of real over foreseen time
 BINS = 3  # of foreseen time left
+SPEEDS = 19  # at which missions are reckoned
 PATIENCE = 3.0  # deadlines that a mission of calibration may last
 
 
@@ -34,6 +38,20 @@ class Steady:
     shares: tuple[float, ...]
     lived: tuple[Lived, ...]
     legs: tuple[tuple[Leg, ...], ...]
+
+    def nets(self, mission: Mission, speeds: Floats) -> Floats:
+        """Mean net value that the missions would have had at each speed, [V]; -inf without any.
+
+        What was seen, and so what was walked, hardly depends on the speed: each mission tells what
+        it would have been worth at every speed.
+        """
+        if not self.legs:
+            return np.full(len(speeds), -np.inf)
+        return np.mean([_nets(mission, legs, speeds) for legs in self.legs], axis=0)
+
+    def joined(self, other: Steady) -> Steady:
+        """The missions of both, which were lived at one division."""
+        return replace(self, lived=self.lived + other.lived, legs=self.legs + other.legs)
 
 
 def live_steadily(
@@ -52,22 +70,80 @@ def live_steadily(
     sensing = np.unique(contracts.shares[:, 0])
     chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
     longest = float(contracts.shares[:, 1:].sum(axis=1).max())
+    return tuple(
+        _steady(program, mission, shares, make_robot, seeds)
+        for shares in _constants(program, chosen.tolist(), longest)
+    )
+
+
+def live_closer(
+    program: CompiledProgram,
+    mission: Mission,
+    lived: Sequence[Steady],
+    make_robot: MakeRobot,
+    *,
+    seeds: Sequence[int],
+    further: Sequence[int],
+) -> tuple[Steady, ...]:
+    """What was lived, and more of it about the division that was worth most: there policies will
+    be, so what chance says of it weighs most.
+
+    That division and its neighbours are lived for the further seeds, and those half-way between
+    them for these and for `seeds`, for which all the others were.
+    """
+    speeds = np.geomspace(*mission.speeds, SPEEDS)
+    best = max(lived, key=lambda steady: float(steady.nets(mission, speeds).max()))
+    alike = [steady for steady in lived if _calls(steady.shares) == _calls(best.shares)]
+    place = alike.index(best)
+    near = alike[max(place - 1, 0) : place + 2]
+
+    def live(shares: tuple[float, ...], seeds: Sequence[int]) -> Steady:
+        return _steady(program, mission, shares, make_robot, seeds)
+
+    known = [one.joined(live(one.shares, further)) if one in near else one for one in lived]
+    between = [
+        tuple((a + b) / 2 for a, b in zip(one.shares, other.shares, strict=True))
+        for one, other in pairwise(near)
+    ]
+    new = [live(shares, [*seeds, *further]) for shares in between]
+    return tuple(sorted([*known, *new], key=lambda steady: steady.shares[0]))
+
+
+def _steady(
+    program: CompiledProgram,
+    mission: Mission,
+    shares: tuple[float, ...],
+    make_robot: MakeRobot,
+    seeds: Sequence[int],
+) -> Steady:
+    division = dict(zip(program.labels, shares, strict=True))
+    policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
     endless = _patient(mission)
-    lived: list[Steady] = []
-    for shares in _constants(program, chosen.tolist(), longest):
-        division = dict(zip(program.labels, shares, strict=True))
-        policy = constant(division, float(np.sqrt(mission.speeds[0] * mission.speeds[1])))
-        told: list[Lived] = []
-        legs: list[tuple[Leg, ...]] = []
-        for seed in seeds:
-            robot = make_robot()
-            route = robot.situation().to_go
-            report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
-            if report and route > 0:
-                told.append(_lived(shares[0], route, report))
-                legs.append(legs_of(report))
-        lived.append(Steady(shares, tuple(told), tuple(legs)))
-    return tuple(lived)
+    lived: list[Lived] = []
+    legs: list[tuple[Leg, ...]] = []
+    for seed in seeds:
+        robot = make_robot()
+        route = robot.situation().to_go
+        report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
+        if report and route > 0:
+            lived.append(_lived(shares[0], route, report))
+            legs.append(legs_of(report))
+    return Steady(shares, tuple(lived), tuple(legs))
+
+
+def _calls(shares: Sequence[float]) -> tuple[bool, ...]:
+    """Which calls are made: divisions with different ones have nothing between them."""
+    return tuple(share > 0 for share in shares)
+
+
+def _nets(mission: Mission, legs: Sequence[Leg], speeds: Floats) -> Floats:
+    """Net values of a mission had it been walked at each speed, [V]."""
+    walked = np.array([leg.walked for leg in legs])[:, None] / speeds
+    thinking = np.array([leg.thinking for leg in legs])[:, None]
+    seconds = np.maximum(walked, thinking).sum(axis=0) + mission.job
+    energy = walked.sum(axis=0) * mission.energy.power(speeds)
+    energy += mission.energy.idle * (seconds - walked.sum(axis=0))
+    return mission.value(seconds) - mission.energy.price * energy
 
 
 def _constants(
@@ -110,8 +186,8 @@ def courses_from(lived: Sequence[Steady]) -> tuple[Course, ...]:
     settings: dict[tuple[bool, ...], list[Course]] = {}
     for steady in lived:
         course = course_of(steady.legs, steady.shares)
-        if course is not None:  # courses of different plans have nothing between them
-            settings.setdefault(tuple(share > 0 for share in steady.shares), []).append(course)
+        if course is not None:
+            settings.setdefault(_calls(steady.shares), []).append(course)
     return tuple(course for alike in settings.values() for course in refined(smoothed(alike)))
 
 

@@ -6,29 +6,29 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from compiler import CompiledProgram
-from monitor.calibration import MakeRobot, Steady
-from monitor.courses import Leg
+from monitor.calibration import SPEEDS, MakeRobot, Steady
 from monitor.missions import Mission
 from monitor.monitoring import Monitor
 from monitor.policies import Constant, Policy, constant
 from monitor.reports import Report
 from monitor.rhythms import Rhythm
 from monitor.states import Decision, State
+from monitor.stopping import errors_apart
 
-Floats = NDArray[np.float64]
-SPEEDS = 19
+ROUND = 20  # missions of each policy, before some are dropped
+BEHIND = 2.0
 
 
 @dataclass(frozen=True)
 class Verdict:
     """What held-out missions said of several policies.
 
-    name: of the best. nets: net value of each mission, by policy, on the same seeds; alone: of
-    those that the best lived afterwards. worth: their mean, what is to be expected of it. missed:
-    by how much that is more than it promises itself; None if it foresees nothing.
+    name: of the best. nets: net value of each mission, by policy, on the same seeds, fewer of those
+    that were dropped; alone: of those that the best lived afterwards. worth: their mean, what is to
+    be expected of it. missed: by how much that is more than it promises itself; None if it foresees
+    nothing.
     """
 
     name: str
@@ -72,7 +72,8 @@ def judge_policies(
     seeds: Sequence[int],
     further: Sequence[int],
 ) -> Verdict:
-    """Which has the greatest mean net value on these seeds, which made none of them.
+    """Which is worth most on these seeds, which made none of them: a race in rounds, in which
+    policies are dropped that are `BEHIND` standard errors of the paired difference behind the best.
 
     further: seeds of missions that the best of them lives alone. What these were worth is what it
     promises: they had no part in the choice, so they do not know the luck that made it the best.
@@ -82,41 +83,34 @@ def judge_policies(
         monitor = Monitor(program, policies[name], name, rhythm)
         return [monitor.run(mission, make_robot(), seed=seed) for seed in seeds]
 
-    nets = {name: tuple(report.net for report in live(name, seeds)) for name in policies}
-    name = max(policies, key=lambda each: float(np.mean(nets[each])))
+    nets: dict[str, list[float]] = {name: [] for name in policies}
+    racing, name = list(policies), next(iter(policies))
+    for start in range(0, len(seeds), ROUND):
+        for each in racing:
+            nets[each] += [report.net for report in live(each, seeds[start : start + ROUND])]
+        name = max(racing, key=lambda each: float(np.mean(nets[each])))
+        if len(nets[name]) < 2:  # a single mission tells of no error
+            continue
+        best = np.array(nets[name])
+        racing = [each for each in racing if errors_apart(best, np.array(nets[each])) < BEHIND]
+        if len(racing) == 1:
+            break
     reports = live(name, further)
     alone = tuple(report.net for report in reports)
     worth = float(np.mean(alone))
     missed = worth - float(np.mean([report.promised for report in reports]))
-    return Verdict(name, nets, alone, worth, missed if np.isfinite(missed) else None)
+    told = {each: tuple(values) for each, values in nets.items()}
+    return Verdict(name, told, alone, worth, missed if np.isfinite(missed) else None)
 
 
 def tuned_division(
     program: CompiledProgram, mission: Mission, lived: Sequence[Steady]
 ) -> Constant | None:
-    """The best fixed division and speed, by missions lived at constant divisions; None without.
-
-    What was seen, and so what was walked, hardly depends on the speed: each mission tells what it
-    would have been worth at every speed.
-    """
+    """The best fixed division and speed, by missions lived at constant divisions; None without."""
     speeds = np.geomspace(*mission.speeds, SPEEDS)
-    best: tuple[float, Constant] | None = None
-    for steady in lived:
-        if not steady.legs:
-            continue
-        nets = np.mean([_nets(mission, legs, speeds) for legs in steady.legs], axis=0)
-        index = int(np.argmax(nets))
-        if best is None or nets[index] > best[0]:
-            shares = dict(zip(program.labels, steady.shares, strict=True))
-            best = float(nets[index]), constant(shares, float(speeds[index]))
-    return best[1] if best else None
-
-
-def _nets(mission: Mission, legs: Sequence[Leg], speeds: Floats) -> Floats:
-    """Net values of a mission had it been walked at each speed, [V]."""
-    walked = np.array([leg.walked for leg in legs])[:, None] / speeds
-    thinking = np.array([leg.thinking for leg in legs])[:, None]
-    seconds = np.maximum(walked, thinking).sum(axis=0) + mission.job
-    energy = walked.sum(axis=0) * mission.energy.power(speeds)
-    energy += mission.energy.idle * (seconds - walked.sum(axis=0))
-    return mission.value(seconds) - mission.energy.price * energy
+    if not any(steady.legs for steady in lived):
+        return None
+    nets = np.array([steady.nets(mission, speeds) for steady in lived])
+    place, index = np.unravel_index(int(np.argmax(nets)), nets.shape)
+    shares = dict(zip(program.labels, lived[int(place)].shares, strict=True))
+    return constant(shares, float(speeds[index]))

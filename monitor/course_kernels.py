@@ -15,6 +15,7 @@ def best_speed(
     left: float,
     thinking: float,
     contract: float,
+    scale: float,
     walked: Floats,
     changes: Floats,
     stops: Floats,
@@ -38,9 +39,9 @@ def best_speed(
     for action in range(len(speeds)):
         total = 0.0
         for outcome in range(len(walked)):
-            drive = min(walked[outcome], left) / speeds[action]
+            drive = min(walked[outcome], left / scale) / speeds[action]
             total -= power[action] * drive
-            if walked[outcome] >= left:  # it arrives; the last frame only walks
+            if walked[outcome] * scale >= left:  # it arrives; the last frame only walks
                 at = now + drive / tick
                 if at < last:
                     k = int(at)
@@ -51,7 +52,7 @@ def best_speed(
             at = now + max(frame / tick, 1.0)
             if at >= last:
                 continue
-            after = min((left - walked[outcome]) * changes[outcome] / cell, rows - 1.0)
+            after = min((left - walked[outcome] * scale) * changes[outcome] / cell, rows - 1.0)
             j, k = min(int(after), rows - 2), int(at)
             u = after - j
             early = worth[k, j] + u * (worth[k, j + 1] - worth[k, j])
@@ -93,6 +94,7 @@ def solve(
                 left,
                 contract,
                 contract,
+                1.0,
                 walked[row],
                 changes[row],
                 stops[row],

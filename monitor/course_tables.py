@@ -59,6 +59,7 @@ class CourseTable:
             to_walk,
             thinking,
             self.course.contract,
+            self.course.forecast.whole / made_on.forecast.whole,
             np.maximum(made_on.walked[row] + (in_hand - made_on.planned), 0.5 * in_hand),
             made_on.changes[row],
             made_on.stops[row],

@@ -20,6 +20,7 @@ PARTS = 6  # of the way, each with its own ratio of what is walked to what the r
 BINS, OUTCOMES = 3, 16  # of what is left; equally likely frames in each
 SHRINK = 0.7  # of the logarithms of a forecast's changes, which partly take each other back
 FAR = 1.2  # times the contract of one course that a neighbour's may have
+TINY = 1e-12
 LEAST_EXCESS = 0.02  # of what is walked over the route
 NEAR = 8.0  # lengths; the forecast of less does not change by ratios
 
@@ -46,29 +47,26 @@ Legs = Sequence[Leg]
 class Forecast:
     """Foresees the length still to be walked.
 
-    whole: length walked in a mission over its route at the start. parts, ratios: walked over
-    route by what is left of the route. trust: weight of what is left of the route; the rest has
-    the whole less what was walked.
+    whole: length walked in a mission over its route at the start. parts, ratios: [P] walked over
+    route by what is left of the route. trust: [P] weight of that there; the rest has the whole less
+    what was walked, which says little near the goal.
     """
 
     whole: float
     parts: Floats
     ratios: Floats
-    trust: float
-
-    def scaled(self, whole: float, trust: float) -> Forecast:
-        """The same for missions in which another length is walked over the route."""
-        ratios = np.maximum(self.ratios * (whole / self.whole), 1.0)
-        return Forecast(whole, self.parts, ratios, trust)
+    trust: Floats
 
     def __call__(self, left: float, walked: float, route: float) -> float:
         """The length to be walked; never less than what is left of the route.
 
-        left: of the route. walked: so far. route: its length when the task was presented.
+        left: of the route. walked: so far, on this course; who has walked on another converts that
+        by their wholes. route: its length when the task was presented.
         """
         seen = left * float(np.interp(left, self.parts, self.ratios))
         reckoned = max(self.whole * route - walked, 0.0)
-        return max(self.trust * seen + (1.0 - self.trust) * reckoned, left)
+        trust = float(np.interp(left, self.parts, self.trust))
+        return max(trust * seen + (1.0 - trust) * reckoned, left)
 
 
 @dataclass(frozen=True)
@@ -129,11 +127,13 @@ def course_of(missions: Sequence[Legs], shares: tuple[float, ...]) -> Course | N
 
 
 def smoothed(courses: Sequence[Course]) -> tuple[Course, ...]:
-    """The courses with their forecasts shrunk towards a line over the seconds of sensing.
+    """The courses with their forecasts shrunk towards what they have in common.
 
     The logarithm of what is walked beyond the route falls about steadily with sensing. With few
-    missions a course, one that was lucky would else be chosen; how far each is moved follows
-    from how much of their distance from the line chance alone explains (empirical Bayes).
+    missions a course, one that was lucky would else be chosen; how far each is moved towards that
+    line follows from how much of its distance chance alone explains (empirical Bayes). Where on
+    the way the excess is walked, and how far to trust that, all tell together: it is a matter of
+    the floor, and between courses that differ in it by chance a policy would go to and fro.
     """
     if len(courses) < 4:
         return tuple(courses)
@@ -142,12 +142,16 @@ def smoothed(courses: Sequence[Course]) -> tuple[Course, ...]:
     line = np.polynomial.Polynomial.fit(seconds, excess, 1)(seconds)
     errors = np.array([course.error / max(course.forecast.whole - 1.0, 0.05) for course in courses])
     apart = float(((excess - line) ** 2).sum()) / (len(courses) - 2)
-    chance = float((errors**2).mean())
-    own = max(0.0, 1.0 - chance / apart) if apart > 0 else 0.0
-    trust = float(np.mean([course.forecast.trust for course in courses]))
+    real = max(0.0, apart - float((errors**2).mean()))
+    own = real / np.maximum(real + errors**2, TINY)
     wholes = 1.0 + np.exp(own * excess + (1.0 - own) * line)
+    forecasts = [course.forecast for course in courses]
+    parts = np.mean([each.parts for each in forecasts], axis=0)
+    trust = np.mean([each.trust for each in forecasts], axis=0)
+    beyond = np.sum([each.ratios - 1.0 for each in forecasts], axis=0)
+    share = beyond / max(sum(each.whole - 1.0 for each in forecasts), TINY)
     return tuple(
-        replace(course, forecast=course.forecast.scaled(float(whole), trust))
+        replace(course, forecast=Forecast(float(whole), parts, 1.0 + (whole - 1.0) * share, trust))
         for course, whole in zip(courses, wholes, strict=True)
     )
 
@@ -199,15 +203,20 @@ def _forecast(missions: Sequence[Legs]) -> Forecast:
     bounds = np.quantile(left, np.linspace(0, 1, PARTS + 1))
     for low, high in pairwise(bounds):
         within = (left >= low) & (left <= high)
-        if within.any():
-            parts.append(float(left[within].mean()))
-            ratios.append(max(1.0, float(to_walk[within].sum() / left[within].sum())))
+        some = within.any()  # not if there are hardly any frames
+        parts.append(float(left[within].mean()) if some else (low + high) / 2.0)
+        ratio = float(to_walk[within].sum() / left[within].sum()) if some else ratios[-1]
+        ratios.append(max(1.0, ratio))
     seen = left * np.interp(left, parts, ratios)
     reckoned = np.maximum(whole * route - (begun - to_walk), 0.0)
-    apart = seen - reckoned
-    weight = float(apart @ apart)
-    trust = float((to_walk - reckoned) @ apart) / weight if weight > 0 else 1.0
-    return Forecast(whole, np.array(parts), np.array(ratios), float(np.clip(trust, 0.0, 1.0)))
+    apart, off = seen - reckoned, to_walk - reckoned
+    trust = [1.0]
+    for low, high in pairwise(bounds):
+        within = (left >= low) & (left <= high)
+        weight = float(apart[within] @ apart[within])
+        share = float(off[within] @ apart[within]) / weight if weight > 0 else 1.0
+        trust.append(float(np.clip(share, 0.0, 1.0)))
+    return Forecast(whole, np.array(parts), np.array(ratios), np.array(trust))
 
 
 def _frames(legs: Legs, forecast: Forecast) -> list[tuple[float, float, float, float]]:

@@ -98,7 +98,7 @@ class _Life:
         self.presented = robot.clock.now()
         self.promised = float("nan")
         self.job = 0.0
-        self.route = self.walked = 0.0
+        self.route = self.walked = self.walked_on = 0.0
         self.inputs: Mapping[str, Any] = {}
 
     def live(self) -> Ending:
@@ -183,6 +183,7 @@ class _Life:
             frame_started=started,
             route=self.route,
             walked=self.walked,
+            walked_on=self.walked_on,
             frame=len(self.frames),
         )
         decision = self.decide(state)
@@ -217,7 +218,10 @@ class _Life:
                 made_on=made_on,
             )
         )
-        self.walked += float(self.frames[-1].story.get("length", 0.0))
+        length = float(self.frames[-1].story.get("length", 0.0))
+        if length > 0:
+            self.walked += length
+            self.walked_on += (made_on - self.walked_on) * length / self.walked
         self.tell()
         if plan is not None:
             try:

@@ -56,7 +56,9 @@ class Optimal:
         """(net value to expect of a course from here on, best speed, length to be walked)."""
         situation = state.situation
         left = situation.to_go + situation.in_hand
-        to_walk = table.course.forecast(left, state.walked, state.route)
+        whole = table.course.forecast.whole
+        walked = state.walked * whole / self._nearest(state.walked_on).course.forecast.whole
+        to_walk = table.course.forecast(left, walked, state.route)
         if state.standing or situation.in_hand <= 0:  # a plan of no length is soon over
             slow, fast = self.mission.speeds
             return table.standing(state.time + thinking, to_walk), (slow * fast) ** 0.5, to_walk

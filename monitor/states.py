@@ -36,7 +36,8 @@ class State:
     made_on: seconds that the sensing behind the plan in hand had.
     advertised, seen: expected quality of what was just computed by its profile, and its estimate;
     None where there is none. contract: the decision in force. route: length of the route when
-    the task was presented. walked: length walked since. frame: its index.
+    the task was presented. walked: length walked since; walked_on: seconds that the sensing behind
+    the plans walked had, on average over their length. frame: its index.
     """
 
     moment: Moment
@@ -50,6 +51,7 @@ class State:
     contract: Decision | None = None
     route: float = 0.0
     walked: float = 0.0
+    walked_on: float = 0.0
     frame: int = 0
 
 

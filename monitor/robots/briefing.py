@@ -15,7 +15,14 @@ from anytime.errors import AnytimeError
 from anytime.faults import Schedule
 from compiler import CompiledProgram, compile
 from monitor.bodies import Robot
-from monitor.calibration import Steady, calibrate, courses_from, live_steadily, rhythm_from
+from monitor.calibration import (
+    Steady,
+    calibrate,
+    courses_from,
+    live_closer,
+    live_steadily,
+    rhythm_from,
+)
 from monitor.choosing import Chosen, Verdict, judge_policies, tuned_division
 from monitor.courses import Course
 from monitor.forking import forked
@@ -38,17 +45,19 @@ RHYTHM_SEED, CALIBRATION_SEED, CHOICE_SEED = 1_000_000, 2_000_000, 2_500_000
 
 @dataclass(frozen=True)
 class Effort:
-    """How many missions are lived for calibration: levels of sensing × seeds, then seeds; to choose
-    the policy, seeds for each, and so many more to learn what the chosen one is worth."""
+    """How many missions are lived for calibration: levels of sensing × seeds, further seeds about
+    the best of them, then seeds; to choose the policy, at most so many seeds for each, and so many
+    more to learn what the chosen one is worth."""
 
     levels: int = 6
     rhythm_seeds: int = 12
+    closer_seeds: int = 12
     seeds: int = 16
-    choice_seeds: int = 40
+    choice_seeds: int = 80
     promise_seeds: int = 120
 
 
-QUICK = Effort(levels=4, rhythm_seeds=3, seeds=6, choice_seeds=4, promise_seeds=4)
+QUICK = Effort(levels=4, rhythm_seeds=3, closer_seeds=0, seeds=6, choice_seeds=4, promise_seeds=4)
 LONG = 400.0  # cells; calibration lives fewer missions that are longer than this
 
 
@@ -59,6 +68,7 @@ def effort_for(scene: Scene) -> Effort:
     return Effort(
         usual.levels,
         max(3, round(share * usual.rhythm_seeds)),
+        round(share * usual.closer_seeds),
         max(6, round(share * usual.seeds)),
         max(6, round(share * usual.choice_seeds)),
         max(6, round(share * usual.promise_seeds)),
@@ -83,6 +93,17 @@ class Briefing:
         """The robot at the start of the mission."""
         clock = clock or WorkClock(self.grid.machine)
         return GridRobot(self.grid.scene, self.grid.mission.energy, clock)
+
+    def live_beforehand(self) -> tuple[Steady, ...]:
+        """Missions at constant divisions, more of them about the best."""
+        last = RHYTHM_SEED + self.effort.rhythm_seeds
+        seeds, further = range(RHYTHM_SEED, last), range(last, last + self.effort.closer_seeds)
+        program, mission, robot = self.program, self.grid.mission, self.robot
+        levels = self.effort.levels
+        lived = live_steadily(program, mission, self.contracts, robot, seeds=seeds, levels=levels)
+        if not further:
+            return lived
+        return live_closer(program, mission, lived, robot, seeds=seeds, further=further)
 
     @cached_property
     def courses(self) -> tuple[Course, ...]:
@@ -273,19 +294,8 @@ def brief_with(
     effort = effort or effort_for(grid.scene)
     unknown = Rhythm(*(np.array([value]) for value in _neutral(grid.scene.frame)))
     briefing = Briefing(grid, program, unknown, effort)
-    seeds = range(RHYTHM_SEED, RHYTHM_SEED + effort.rhythm_seeds)
     lived = memory.recall(
-        "lived",
-        _described(grid, program, effort),
-        tuple[Steady, ...],
-        lambda: live_steadily(
-            program,
-            grid.mission,
-            briefing.contracts,
-            briefing.robot,
-            seeds=seeds,
-            levels=effort.levels,
-        ),
+        "lived", _described(grid, program, effort), tuple[Steady, ...], briefing.live_beforehand
     )
     return Briefing(grid, program, rhythm_from(lived) or unknown, effort, lived, memory)
 

@@ -10,7 +10,8 @@ import pytest
 from anytime import AnytimeError
 from experiments import shipped
 from monitor import Energy, Mission, News, State, Value
-from monitor.choosing import Chosen, judge_policies, tuned_division
+from monitor.calibration import live_closer
+from monitor.choosing import ROUND, Chosen, judge_policies, tuned_division
 from monitor.logs import write_log
 from monitor.policies import constant
 from monitor.regrets import regrets
@@ -72,8 +73,40 @@ def test_optimal_is_one_of_the_table_the_expectation_and_a_fixed_division(briefi
     policy = briefing.monitor("optimal").policy
     assert isinstance(policy, Chosen)
     assert set(policy.policies) == {"table", "expected", "fixed"}
-    nets = policy.verdict.nets
-    assert np.mean(nets[policy.verdict.name]) == max(np.mean(each) for each in nets.values())
+    assert policy.verdict.name in policy.policies
+
+
+def test_a_policy_that_falls_far_behind_lives_no_more_missions(briefing):
+    shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
+    policies = {name: constant(shares, speed) for name, speed in (("slow", 1.0), ("brisk", 5.0))}
+    program, robot = briefing.program, briefing.robot
+    seeds, further = range(70, 70 + 2 * ROUND), range(200, 202)
+    verdict = judge_policies(program, MISSION, policies, None, robot, seeds=seeds, further=further)
+    assert {name: len(nets) for name, nets in verdict.nets.items()} == dict.fromkeys(
+        policies, ROUND
+    )
+
+
+def test_of_policies_that_are_alike_the_first_is_taken(briefing):
+    shares = dict(zip(briefing.program.labels, (0.5, 0.2), strict=True))
+    slow, brisk = constant(shares, 1.0), constant(shares, 5.0)
+    assert judged(briefing, {"slow": slow, "one": brisk, "same": brisk}).name == "one"
+
+
+def test_more_is_lived_about_the_best_division(briefing):
+    speeds = np.geomspace(*MISSION.speeds, 9)
+    first = briefing.lived
+    seeds, further = range(3), range(3, 5)
+    lived = live_closer(
+        briefing.program, MISSION, first, briefing.robot, seeds=seeds, further=further
+    )
+    best = max(first, key=lambda steady: steady.nets(MISSION, speeds).max())
+    sensing = [steady.shares[0] for steady in lived]
+    assert sensing == sorted(sensing)
+    assert {steady.shares for steady in first} < {steady.shares for steady in lived}
+    again = next(steady for steady in lived if steady.shares == best.shares)
+    assert again.legs[: len(best.legs)] == best.legs
+    assert len(again.legs) > len(best.legs)
 
 
 def test_a_division_is_tuned_on_missions_that_were_lived_at_another_speed(briefing):

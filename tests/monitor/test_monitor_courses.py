@@ -92,6 +92,28 @@ def test_a_course_that_was_lucky_is_moved_towards_its_neighbours():
     assert sure[2].forecast.whole == pytest.approx(made[2].forecast.whole)
 
 
+def test_near_the_goal_what_was_walked_says_little():
+    made = course_of([legs(factor=factor) for factor in np.linspace(1.1, 1.9, 9)], (1.9, 0.1))
+    assert made is not None
+    for walked in (150.0, 300.0):  # of 176 to 304
+        assert made.forecast(8.0, walked, 160.0) == pytest.approx(1.5 * 8.0, rel=0.5)
+
+
+def test_who_saw_badly_so_far_has_not_gone_farther_for_it():
+    poor = POLICY.tables[0].course
+    half = state(to_go=64.0, walked=poor.forecast.whole * 80.0, walked_on=poor.shares[0])
+    for table, factor in zip(POLICY.tables, (2.2, 1.5, 1.1), strict=True):
+        _, _, to_walk = POLICY.worth(table, half, 0.0)
+        assert to_walk == pytest.approx(factor * 80.0, rel=0.15)
+
+
+def test_a_plan_made_on_less_sensing_brings_one_less_far():
+    good, poor = POLICY.tables[2], POLICY.tables[0].course
+    shorter = replace(poor, walked=good.course.walked, changes=good.course.changes)
+    worths = [good.walking(5.0, 150.0, 16.0, 0.0, on)[0] for on in (good.course, shorter)]
+    assert worths[1] < worths[0]
+
+
 def test_between_neighbours_that_are_far_apart_there_is_another():
     one, other = course(1.8, 1.0), course(1.2, 3.0)
     made = refined([one, other])
