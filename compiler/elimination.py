@@ -83,8 +83,8 @@ def eliminate(
         for bucket in buckets:
             tables.append(_left_behind(bucket, tables, order.scopes, semiring, machine_code))
     rest = [_aligned(tables[number], order.scopes[number], order.keep) for number in order.left]
-    parts: Mapping[int, slice] = order.parts if machine_code is not None else {}
-    return Factor(order.keep, _joined(rest, semiring)), (Step(order, tuple(tables), parts),)
+    step = Step(order, tuple(tables), order.parts if machine_code is not None else {})
+    return Factor(order.keep, _joined(rest, semiring)), (step,)
 
 
 def _left_behind(
