@@ -89,8 +89,11 @@ def live_closer(
     be, so what chance says of it weighs most.
 
     That division and its neighbours are lived for the further seeds, and those half-way between
-    them for these and for `seeds`, for which all the others were.
+    them for these and for `seeds`, for which all the others were. Nothing more where no mission
+    reached its goal.
     """
+    if not any(steady.legs for steady in lived):
+        return tuple(lived)
     speeds = np.geomspace(*mission.speeds, SPEEDS)
     best = max(lived, key=lambda steady: float(steady.nets(mission, speeds).max()))
     alike = [steady for steady in lived if _calls(steady.shares) == _calls(best.shares)]

@@ -109,6 +109,15 @@ def test_more_is_lived_about_the_best_division(briefing):
     assert len(again.legs) > len(best.legs)
 
 
+def test_where_no_mission_reached_its_goal_no_more_are_lived(briefing):
+    none = tuple(replace(steady, lived=(), legs=()) for steady in briefing.lived)
+    seeds, further = range(3), range(3, 5)
+    again = live_closer(
+        briefing.program, MISSION, none, briefing.robot, seeds=seeds, further=further
+    )
+    assert again == none
+
+
 def test_a_division_is_tuned_on_missions_that_were_lived_at_another_speed(briefing):
     tuned = tuned_division(briefing.program, MISSION, briefing.lived)
     assert tuned is not None
