@@ -29,26 +29,33 @@ WALKS = [
 
 @njit(nogil=True)
 def _least(costs: Floats, table: Floats, least: Floats) -> None:
-    """Lowers `least`, [b], to costs[v] + table[v, b]. Four rows at once, so that what is lowered
-    is read and written once for them."""
+    """Lowers `least`, [b], to costs[v] + table[v, b]. Eight rows at once, so that what is lowered
+    is read and written once for them; it is read before it is compared, else the compiler stores
+    under a mask, and the next rows wait for that."""
     levels, last = table.shape
-    for v in range(0, levels - 3, 4):
-        cost, cost1, cost2, cost3 = costs[v], costs[v + 1], costs[v + 2], costs[v + 3]
-        row, row1, row2, row3 = table[v], table[v + 1], table[v + 2], table[v + 3]
+    for v in range(0, levels - 7, 8):
+        c0, c1, c2, c3 = costs[v], costs[v + 1], costs[v + 2], costs[v + 3]
+        c4, c5, c6, c7 = costs[v + 4], costs[v + 5], costs[v + 6], costs[v + 7]
+        r0, r1, r2, r3 = table[v], table[v + 1], table[v + 2], table[v + 3]
+        r4, r5, r6, r7 = table[v + 4], table[v + 5], table[v + 6], table[v + 7]
         for b in range(last):
-            total, total1 = cost + row[b], cost1 + row1[b]
-            total2, total3 = cost2 + row2[b], cost3 + row3[b]
-            total = total if total < total1 else total1
-            total2 = total2 if total2 < total3 else total3
-            total = total if total < total2 else total2
+            t0, t1, t2, t3 = c0 + r0[b], c1 + r1[b], c2 + r2[b], c3 + r3[b]
+            t4, t5, t6, t7 = c4 + r4[b], c5 + r5[b], c6 + r6[b], c7 + r7[b]
+            t0 = t0 if t0 < t1 else t1
+            t2 = t2 if t2 < t3 else t3
+            t4 = t4 if t4 < t5 else t5
+            t6 = t6 if t6 < t7 else t7
+            t0 = t0 if t0 < t2 else t2
+            t4 = t4 if t4 < t6 else t6
+            t0 = t0 if t0 < t4 else t4
             before = least[b]
-            least[b] = total if total < before else before
-    for v in range(levels - levels % 4, levels):
-        cost = costs[v]
-        row = table[v]
+            least[b] = t0 if t0 < before else before
+    for v in range(levels - levels % 8, levels):
+        cost, row = costs[v], table[v]
         for b in range(last):
             total = cost + row[b]
-            least[b] = total if total < least[b] else least[b]
+            before = least[b]
+            least[b] = total if total < before else before
 
 
 @njit(LAYOUTS, cache=True, nogil=True)
