@@ -20,8 +20,9 @@ from anytime.measuring import problem_keys
 from anytime.modules import Module
 from anytime.outcomes import Outcome
 from anytime.pictures import number
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
 from anytime.programs import Program, program_of
+from anytime.recordings import Recording
 from anytime.running import seed_of
 from anytime.sampling import How, sampled
 

@@ -15,7 +15,8 @@ from anytime.errors import AnytimeError
 from anytime.files import Stored, read_record, write_record
 from anytime.machines import Machine, Rate, processor
 from anytime.pictures import clipped, figure
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
+from anytime.recordings import Recording
 
 PROFILE = "anytime.profile/1"
 MACHINE = "anytime.machine/1"

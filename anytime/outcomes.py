@@ -12,7 +12,7 @@ import numpy as np
 from anytime import journals
 from anytime.files import Stored
 from anytime.journals import Journal
-from anytime.profiles import Recording
+from anytime.recordings import Recording
 
 SCHEMA = "anytime.runs/1"
 

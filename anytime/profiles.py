@@ -9,83 +9,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from anytime.clocks import DECIMALS
+from anytime.distributions import Distribution
 from anytime.errors import AnytimeError
 from anytime.machines import Machine
 from anytime.pictures import clipped, duration, figure, line_chart, number, sparkline
+from anytime.recordings import Recording
 from anytime.strata import stratum_weights
 
 Floats = NDArray[np.float64]
 FALLS = 0.05  # of expected quality from its best moment to the end of the runs, which is told
-
-
-@dataclass(frozen=True)
-class Recording:
-    """One recorded run of a module on one problem.
-
-    inputs: achieved quality of what arrived at each parameter that another module feeds.
-    seconds, work, raw, estimates: [n] at each registration, thinned; seconds to the picosecond;
-        raw is the quality, or the cost for a module with a cost; estimates are NaN for a module
-        without one.
-    end: seconds, work when the run ended.
-    results: registrations in all, of which some are left out here; by default none is.
-    steps: check-points in all, at which it can be ended; by default one for each result.
-    """
-
-    problem: str
-    call: str
-    inputs: Mapping[str, float]
-    features: Mapping[str, float]
-    seconds: Floats
-    work: Floats
-    raw: Floats
-    estimates: Floats
-    end: tuple[float, float]
-    complete: bool
-    results: int = 0
-    steps: int = 0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "results", self.results or len(self.seconds))
-        object.__setattr__(self, "steps", self.steps or self.results)
-        # The same steps added in another order differ in the last bit, and are the same moment.
-        object.__setattr__(self, "seconds", np.round(self.seconds, DECIMALS))
-        object.__setattr__(self, "end", (round(float(self.end[0]), DECIMALS), float(self.end[1])))
-
-
-@dataclass(frozen=True)
-class Distribution:
-    """A distribution of quality: values [n] in [0, 1], NaN = no result; weights [n], sum 1."""
-
-    values: Floats
-    weights: Floats
-
-    @property
-    def mean(self) -> float:
-        """Expected quality; no result counts 0."""
-        return float(self.weights @ np.nan_to_num(self.values))
-
-    @property
-    def no_result(self) -> float:
-        """Probability that there is no result at all."""
-        return float(self.weights[np.isnan(self.values)].sum())
-
-    def at_least(self, quality: float) -> float:
-        """Probability of a result of this quality or better."""
-        return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())
-
-    def quantile(self, share: float) -> float:
-        """The quality that a share of the runs stays below; NaN where that is no result.
-
-        Raises AnytimeError for a share outside [0, 1].
-        """
-        if not 0 <= share <= 1:
-            raise AnytimeError(f"a share of {share} of the runs; give one in [0, 1]")
-        order = np.argsort(np.nan_to_num(self.values, nan=-1.0), kind="stable")
-        order = order[self.weights[order] > 0]
-        cumulative = np.cumsum(self.weights[order])
-        index = min(int(np.searchsorted(cumulative, share - 1e-12)), len(order) - 1)
-        return float(self.values[order[index]])
 
 
 @dataclass(frozen=True)

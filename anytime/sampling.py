@@ -17,8 +17,8 @@ from anytime.knobs import family_of
 from anytime.machines import step_bin
 from anytime.modules import Module
 from anytime.outcomes import Outcome, Pace
-from anytime.profiles import Recording
 from anytime.programs import Call, Input, Join, Program, makers, upstream
+from anytime.recordings import Recording
 from anytime.results import Change, Result
 from anytime.running import Run, execute, seed_of
 from anytime.structure import answers

@@ -13,8 +13,9 @@ from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine
 from anytime.modules import Module
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
 from anytime.programs import Call, Input, Program, reading, upstream
+from anytime.recordings import Recording
 from anytime.shadow import Frame, Seen, Shadow, Watched
 
 FEWEST = 20  # frames from which anything is said

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
+from anytime.recordings import Recording
 from compiler.division import Floats, Frontier, moments_within, output_chances
 from compiler.tables import Table
 

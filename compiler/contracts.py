@@ -13,7 +13,8 @@ from anytime import running
 from anytime.clocks import Deadline
 from anytime.errors import AnytimeError
 from anytime.modules import Module
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
+from anytime.recordings import Recording
 from anytime.results import Change, Result, Status
 from anytime.running import Run, execute
 from compiler.compiled import CompiledProgram

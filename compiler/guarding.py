@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.clocks import INSTANT
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
+from anytime.recordings import Recording
 from anytime.running import Run
 
 Floats = NDArray[np.float64]

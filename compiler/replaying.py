@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from anytime.clocks import INSTANT
 from anytime.joins import Best
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
 from anytime.programs import Join, Program, upstream
+from anytime.recordings import Recording
 from anytime.running import RECENT
 from anytime.sampling import CHANGES
 from anytime.strata import stratum_weights

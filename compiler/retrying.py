@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.modules import Module
-from anytime.profiles import Floats, Profile, Recording
+from anytime.profiles import Floats, Profile
 from anytime.programs import program_of
+from anytime.recordings import Recording
 from compiler.curves import curve
 from compiler.deadlines import Survival
 from compiler.tables import tables

@@ -61,6 +61,16 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
             "max → min",
         ): "all are of one length",
     },
+    "anytime.distributions": {
+        (
+            "return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())",
+            "1.0 → 2.0",
+        ): _BELOW,
+        (
+            'order = np.argsort(np.nan_to_num(self.values, nan=-1.0), kind="stable")',
+            "1.0 → 2.0",
+        ): _BELOW,
+    },
     "anytime.profiles": {
         (
             "by_problem[run.problem] = by_problem.get(run.problem, 0.0) + weight",
@@ -70,14 +80,6 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
             "ends = np.array([here.band(times * each, confidence, resamples) for each in speeds])",
             "Mult → Div",
         ): "the speeds are a number, its inverse and 1",
-        (
-            "return float(self.weights[np.nan_to_num(self.values, nan=-1.0) >= quality].sum())",
-            "1.0 → 2.0",
-        ): _BELOW,
-        (
-            'order = np.argsort(np.nan_to_num(self.values, nan=-1.0), kind="stable")',
-            "1.0 → 2.0",
-        ): _BELOW,
         (
             "quality = np.where(run.raw > 0, reference / run.raw, 1.0)",
             "1.0 → 2.0",

@@ -32,6 +32,10 @@ TARGETS = {
         "compiler/test_compiler_elimination.py",
         "compiler/test_compiler_solving.py",
     ),
+    "anytime.distributions": (
+        "anytime/test_anytime_distributions.py",
+        "anytime/test_anytime_profiles.py",
+    ),
     "anytime.profiles": ("anytime/test_anytime_profiles.py",),
     "monitor.policies": ("monitor/test_monitor_policies.py",),
     "monitor.inter_frame": ("monitor/test_monitor_policies.py",),

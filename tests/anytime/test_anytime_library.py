@@ -20,7 +20,7 @@ from anytime import AnytimeError, Machine, Profile, ProfileLibrary
 from anytime.files import checksum, write_atomically
 from anytime.library import read_machine, read_profile, write_machine
 from anytime.machines import Rate, processor
-from anytime.profiles import Recording
+from anytime.recordings import Recording
 
 
 def small(module="find", references=None, inputs=("boxes",)) -> Profile:

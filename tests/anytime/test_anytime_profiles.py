@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, Machine, Profile
-from anytime.profiles import Distribution, Recording
+from anytime.recordings import Recording
 
 qualities = st.floats(0, 1)
 
@@ -429,18 +429,6 @@ def test_the_text_says_how_many_problems_a_condition_leaves():
     runs_ = tuple(recording(f"p{i}", [0.5], features={"density": float(i)}) for i in range(9))
     text = repr(Profile("see", (), runs_).given(density=0.0))
     assert "given density=0 | 9 problems as 3, 9 runs" in text
-
-
-def test_a_distribution_is_what_its_weights_say():
-    distribution = Distribution(np.array([np.nan, 0.5, 1.0]), np.array([0.5, 0.25, 0.25]))
-    assert distribution.mean == 0.375
-    assert distribution.no_result == 0.5
-    assert np.isnan(distribution.quantile(0.5))
-    assert [distribution.quantile(share) for share in (0.6, 0.9, 1.0)] == [0.5, 1.0, 1.0]
-
-
-def test_what_has_no_weight_is_no_quantile():
-    assert Distribution(np.array([0.1, 0.5]), np.array([0.0, 1.0])).quantile(0.0) == 0.5
 
 
 @given(profiles(), st.floats(0.1, 10))

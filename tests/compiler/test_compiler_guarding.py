@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import anytime
 from anytime import Deadline, Machine, Profile, WorkClock
-from anytime.profiles import Recording
+from anytime.recordings import Recording
 from anytime.running import execute
 from compiler.guarding import STEPS, Steps, guard, last_guard, steps_of
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import anytime
 import compiler
 from anytime import AnytimeError, Machine, Profile, ProfileLibrary
-from anytime.profiles import Recording
+from anytime.recordings import Recording
 from monitor import Decision, Energy, Mission, Situation, State, Value
 from monitor.calibration import spread_of
 from monitor.inter_frame import (

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from anytime import AnytimeError, Machine, ProfileLibrary
-from anytime.profiles import Profile, Recording
+from anytime.profiles import Profile
 from anytime.programs import program_of
+from anytime.recordings import Recording
 from compiler import compile
 from monitor.shifts import GROUPS, SAME, shifts_of_libraries, shifts_of_schedules
 from sensing.vision import see
