@@ -114,9 +114,9 @@ def _array(name: str, value: Any) -> np.ndarray:
         array = np.asarray(value)
     except ValueError:
         array = np.array(None)
-    if array.dtype.kind == "b":
+    if array.dtype.kind == "b" and array.ndim == 0:
         return array
-    if array.dtype.kind in "iu":
+    if array.dtype.kind in "biu":  # native records hold no arrays of bools: they become 0 and 1
         return array.astype(np.int64)
     if array.dtype.kind == "f":
         return array.astype(np.float64)

@@ -35,6 +35,12 @@ def beyond(rng, w):
 
 
 @query.model
+def way_out(rng, w):
+    door = rng.randint("door", 4)
+    return 0.0 if w.open and w.free[door] else 1.0
+
+
+@query.model
 def careless(rng, w):
     w.a[0] += rng.gaussian("x")
     return w.a[0]
@@ -127,6 +133,17 @@ def test_a_model_may_have_any_number_of_sources(is_native):
 def test_an_index_beyond_an_array_of_the_world_is_an_error():
     with pytest.raises(IndexError):
         Query(beyond, {"a": np.array([1.0, 2.0, 3.0])}, seed=1).step(6)
+
+
+@pytest.mark.parametrize("is_native", [False, True])
+def test_a_world_may_hold_flags_alone_and_in_arrays(is_native):
+    world = {"open": True, "free": np.array([False, False, True, False])}
+    searched = Query(way_out, world, seed=1, native=is_native)
+    searched.step(5)
+    assert searched.value == 0.0
+    searched.world["free"] = np.array([False, True, False, False])
+    searched.step(5)
+    assert dict(searched.best.choices) == {("door", 0): 1}
 
 
 def test_a_model_changes_no_world():
