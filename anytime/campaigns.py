@@ -7,6 +7,7 @@ executor gives the same bytes when time is counted in work.
 from __future__ import annotations
 
 import functools
+import os
 import pickle
 import time
 import warnings
@@ -36,13 +37,16 @@ def lived(
     how: How,
     make: Make | None,
     keep: Callable[[Outcome], None],
+    *,
+    hopeful: bool = False,
 ) -> None:
     """Run a program on problems and hand each outcome to `keep`, as they come.
 
     make: makes the executor, anew when its workers died; None runs here, as does what cannot be
-    sent. Raises AnytimeError when the first problems all fail, with the reason.
+    sent. hopeful: whether others have succeeded before. Raises AnytimeError when the first problems
+    all fail, unless it is hopeful, with the reason.
     """
-    counted = _hopeful(keep)
+    counted = keep if hopeful else _hopeful(keep)
     if make is None:
         _here(program, problems, problems, how, counted)
         return
@@ -71,9 +75,14 @@ def _here(
 def _outcome(program: Program, key: str, problem: Any, how: How) -> Outcome:
     try:
         return sampled(program, key, problem, how)
-    except Exception as error:  # one problem's trouble is not the campaign's
-        told = str(error) if isinstance(error, AnytimeError) else f"{type(error).__name__}: {error}"
-        return Outcome(key, failed=" ".join(told.split())[:300])
+    except (Exception, SystemExit) as error:  # one problem's trouble is not the campaign's
+        return _failed(key, error)
+
+
+def _failed(key: str, error: BaseException) -> Outcome:
+    told = str(error) if isinstance(error, AnytimeError) else f"{type(error).__name__}: {error}"
+    told = told.encode(errors="backslashreplace").decode()  # a store is UTF-8
+    return Outcome(key, failed=" ".join(told.split())[:300])
 
 
 def _hopeful(keep: Callable[[Outcome], None]) -> Callable[[Outcome], None]:
@@ -111,16 +120,24 @@ def _job(program: Program, how: How) -> bytes:
     return pickle.dumps((addresses, pickle.dumps((program, how))))
 
 
-def _perform(job: bytes, batch: list[tuple[str, bytes]], longest: float) -> list[Outcome]:
-    """What a worker does. One that hangs is ended by a watchdog, which is a worker that died."""
+def _perform(
+    job: bytes, batch: list[tuple[str, bytes]], longest: float, sender: int
+) -> list[Outcome]:
+    """What a worker does. One that hangs is ended by a watchdog, which is a worker that died; but
+    not a thread of the process that sent it, which would be ended with it."""
     import faulthandler
 
     program, how = _unpacked(job)
     done: list[Outcome] = []
-    for key, problem in batch:
-        faulthandler.dump_traceback_later(longest, exit=True, file=2)
+    for key, content in batch:
+        if os.getpid() != sender:
+            faulthandler.dump_traceback_later(longest, exit=True, file=2)
         try:
-            done.append(_outcome(program, key, pickle.loads(problem), how))
+            problem = pickle.loads(content)
+        except Exception as error:
+            done.append(_failed(key, error))
+        else:
+            done.append(_outcome(program, key, problem, how))
         finally:
             faulthandler.cancel_dump_traceback_later()
     return done
@@ -181,7 +198,7 @@ class _Crew:
     def _send(self, executor: Executor, keys: list[str]) -> None:
         batch = [(key, self._cargo[key]) for key in keys]
         try:
-            future = executor.submit(_perform, self._job, batch, self._longest)
+            future = executor.submit(_perform, self._job, batch, self._longest, os.getpid())
         except BrokenExecutor:
             self._suspects.extend(keys)
             raise
@@ -226,5 +243,6 @@ class _Crew:
                     key,
                     failed=f"its worker died {TRIES} times; a script needs its work under "
                     'if __name__ == "__main__":',
+                    fatal=True,
                 )
             )

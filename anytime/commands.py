@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +113,6 @@ def profile(options: argparse.Namespace) -> Answer:
         store = kept / f"{what.name}.runs"
         until = _until_regret(what, until_regret, options.seconds) if until_regret else None
         with (
-            nullcontext() if options.resume else _anew(store),
             told() as warned,
             progress(f"measuring {what.name}") as report,
         ):
@@ -126,6 +123,7 @@ def profile(options: argparse.Namespace) -> Answer:
                 seed=options.seed,
                 executor=options.executor,
                 store=store,
+                resume=options.resume,
                 progress=report,
                 until=until,
             )
@@ -209,21 +207,6 @@ def _problems(what: Any, options: argparse.Namespace, most: int) -> list[Any]:
             f"{options.problems or f'problems of {what.name}'}: {type(error).__name__}: {error}; "
             "give a function (rng) that returns or yields problems"
         ) from error
-
-
-@contextmanager
-def _anew(store: Path) -> Iterator[None]:
-    """Runs that are kept from before make way for new ones, as soon as there are any."""
-    before = store.with_name(f"{store.name}.before")
-    if store.exists():
-        store.replace(before)
-    try:
-        yield
-    finally:
-        if before.exists() and store.exists():
-            before.unlink()
-        elif before.exists():
-            before.replace(store)
 
 
 def library(options: argparse.Namespace) -> Answer:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import pickle
 from collections.abc import Iterable
 from typing import Any, cast
@@ -35,10 +36,19 @@ def _content(value: Any) -> bytes:
         return _joined([kind, *sorted(map(_content, cast("set[Any]", value)))])
     if type(value) in (list, tuple):
         return _joined([kind, *map(_content, cast("list[Any]", value))])
+    content = io.BytesIO()
     try:
-        return pickle.dumps(value, protocol=5)
+        _Pickler(content, protocol=5).dump(value)
+        return content.getvalue()
     except Exception as error:  # whatever the value's own methods raise
         raise TypeError(f"{type(value).__name__} cannot be pickled: {error}") from error
+
+
+class _Pickler(pickle.Pickler):
+    """Writes the sets within a value by what they hold: their order differs between processes."""
+
+    def persistent_id(self, obj: Any) -> bytes | None:
+        return _content(obj) if type(obj) in (set, frozenset) else None
 
 
 def _array(array: NDArray[Any]) -> bytes:

@@ -96,7 +96,7 @@ def _dask(address: str) -> Executor:
         ) from None
     try:
         client: Any = distributed.Client(address, timeout=10, set_as_default=False)  # untyped
-    except (OSError, TimeoutError) as error:
+    except (OSError, TimeoutError, ValueError) as error:
         raise AnytimeError(
             f"no Dask scheduler at {address} ({type(error).__name__}); start one with: dask "
             "scheduler --host 127.0.0.1"

@@ -65,10 +65,10 @@ class ProfileLibrary(Mapping[str, Profile]):
     def updated(self, other: ProfileLibrary) -> ProfileLibrary:
         """This library with the profiles and rates of another one added or replaced."""
         rates = {**self.machine.rates, **other.machine.rates}
-        known = (self.machine.host, other.machine.host)
         # Seconds of two kinds of machine in one folder: the doubt stays.
-        mixed = all(known) and not set(self._profiles) <= set(other._profiles)
-        machine = Machine(other.machine.name, rates, known[0] if mixed else known[1])
+        mixed = not set(self._profiles) <= set(other._profiles)
+        host = self.machine.host if mixed and self.machine.host else other.machine.host
+        machine = Machine(other.machine.name, rates, host)
         return ProfileLibrary(profiles={**self._profiles, **other._profiles}, machine=machine)
 
     def save(self, folder: str | Path) -> None:

@@ -7,7 +7,7 @@ import math
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import nullcontext, suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from anytime.errors import AnytimeError
 from anytime.library import ProfileLibrary
 from anytime.machines import Machine, Rate, charged_rate, processor, stepped_rate
 from anytime.modules import Module
-from anytime.outcomes import Campaign, Outcome, Pace, opened
+from anytime.outcomes import Campaign, Outcome, Pace, Store, opened
 from anytime.profiles import Profile
 from anytime.programs import Constant, Program, program_of, upstream
 from anytime.sampling import How, sampled
@@ -38,6 +38,7 @@ def measure(
     seed: int = 0,
     executor: Executor | str | None = None,
     store: str | Path | None = None,
+    resume: bool = True,
     progress: Callable[[int, int], None] | None = None,
     until: Callable[[ProfileLibrary], bool] | None = None,
 ) -> ProfileLibrary:
@@ -53,8 +54,9 @@ def measure(
     executor: where runs are made, `"processes:4"`, `"dask://127.0.0.1:8786"` or any executor of
     yours; modules travel by their names, and what cannot travel is measured here, with a warning
     that says why. store: a file that each problem's runs are added to as they come; what it holds
-    already is not run again. until: asked now and then, with the profiles so far, whether that is
-    enough (`compiler.UntilRegret`); then no more problems are begun. With any of them, a problem
+    already is not run again, but for what raised. resume: false if all that it holds is to make way
+    for the first runs that come. until: asked now and then, with the profiles so far, whether that
+    is enough (`compiler.UntilRegret`); then no more problems are begun. With any of them, a problem
     that fails, or kills its worker twice, is left out with a warning; without them the first that
     fails is raised.
 
@@ -97,7 +99,9 @@ def measure(
         if until is not None:
             watch = _Watch(keys, lambda good: until(_library(program, good, known)))
         file = None if store is None else Path(store)
-        found = _campaign(program, named, how, executor or "serial", file, progress, watch)
+        campaign = _described(program, how)
+        kept = nullcontext() if file is None else opened(file, campaign, anew=not resume)
+        found = _campaign(program, named, how, executor or "serial", kept, progress, watch)
     return _library(program, found, known)
 
 
@@ -121,15 +125,21 @@ def _campaign(
     problems: Mapping[str, Any],
     how: How,
     executor: Executor | str,
-    path: Path | None,
+    kept: AbstractContextManager[Store | None],
     progress: Callable[[int, int], None] | None,
     watch: _Watch | None,
 ) -> list[Outcome]:
     """Outcomes of all problems but those that fail, in the order of the problems; up to where the
     watch has seen enough."""
     make = executors.maker(executor) if isinstance(executor, str) else executors.lent(executor)
-    with nullcontext() if path is None else opened(path, _described(program, how)) as store:
-        found = {key: o for key, o in store.kept.items() if key in problems} if store else {}
+    with kept as store:
+        before = store.kept.items() if store else ()
+        # What failed may have been mended since; what killed its worker might kill this process.
+        found = {
+            key: outcome
+            for key, outcome in before
+            if key in problems and (outcome.failed is None or outcome.fatal)
+        }
 
         def keep(outcome: Outcome) -> None:
             found[outcome.problem] = outcome
@@ -145,7 +155,14 @@ def _campaign(
         try:
             if watch is not None:
                 watch.look(found)
-            lived(program, left, how, make, keep)
+            lived(
+                program,
+                left,
+                how,
+                make,
+                keep,
+                hopeful=any(outcome.failed is None for outcome in found.values()),
+            )
         except _EnoughError:
             used = used[: watch.seen] if watch else used
     for outcome in found.values():

@@ -30,7 +30,8 @@ class Outcome:
     """What the runs of a program's calls on one problem came to.
 
     recordings: by call. references: of each module with a cost, the cheapest known result. paces:
-    by module. failed: why there is nothing, of a problem that is left out.
+    by module. failed: why there is nothing, of a problem that is left out. fatal: whether that
+    ended its worker, so that it is not tried again unasked.
     """
 
     problem: str
@@ -40,6 +41,7 @@ class Outcome:
     references: Mapping[str, float] = field(default_factory=dict[str, float])
     paces: Mapping[str, tuple[Pace, ...]] = field(default_factory=dict[str, tuple[Pace, ...]])
     failed: str | None = None
+    fatal: bool = False
 
 
 class Campaign(Stored):
@@ -72,6 +74,7 @@ class _Line(Stored):
     references: dict[str, float]
     paces: dict[str, list[tuple[bool, list[tuple[float, float]]]]]
     failed: str | None
+    fatal: bool = False
 
 
 class Store:
@@ -87,13 +90,13 @@ class Store:
 
 
 @contextlib.contextmanager
-def opened(path: Path, campaign: Campaign) -> Generator[Store]:
+def opened(path: Path, campaign: Campaign, *, anew: bool = False) -> Generator[Store]:
     """The store at a path, made if there is none; a torn last line is dropped.
 
-    Raises AnytimeError for a store of another campaign, one that another process writes to, and
-    for what is not a store.
+    anew: what it holds makes way for the first outcome. Raises AnytimeError for a store of another
+    campaign, one that another process writes to, and for what is not a store.
     """
-    with journals.opened(path, campaign, _Line) as journal:
+    with journals.opened(path, campaign, _Line, anew=anew) as journal:
         yield Store(journal)
 
 
@@ -109,6 +112,7 @@ def _line(outcome: Outcome) -> _Line:
             for name, paces in outcome.paces.items()
         },
         failed=outcome.failed,
+        fatal=outcome.fatal,
     )
 
 
@@ -136,7 +140,9 @@ def _outcome(stored: _Line) -> Outcome:
         name: tuple(Pace(charged, tuple(pieces)) for charged, pieces in rows)
         for name, rows in stored.paces.items()
     }
-    return Outcome(stored.problem, recordings, stored.references, paces, stored.failed)
+    return Outcome(
+        stored.problem, recordings, stored.references, paces, stored.failed, stored.fatal
+    )
 
 
 def _recording(problem: str, label: str, row: _Row) -> Recording:

@@ -34,6 +34,23 @@ def climb(start, trap, *, rng):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+def leave(value):
+    sys.exit("no more")
+
+
+@anytime.module(quality=leave)
+def judged(start):
+    yield start
+
+
+@anytime.module(quality=lambda value: value)
+def mended(bug):
+    if bug and Path(bug).exists():
+        raise ValueError("a bug")
+    anytime.charge(1)
+    yield 0.5
+
+
 @anytime.module(quality=lambda value: value)
 def fragile(how):
     if how == "raises":
@@ -159,6 +176,73 @@ def test_a_run_that_kills_its_workers_is_left_out_and_the_others_stand(tmp_path)
     assert len(library["fragile"].problems) == 10
     with pytest.warns(UserWarning, match="5 kills is left out"):  # and not tried again
         anytime.measure(fragile, asked, seconds=1.0, clock=CLOCK, store=store)
+
+
+def test_what_raised_is_tried_again_when_the_campaign_goes_on(tmp_path):
+    bug, store = tmp_path / "bug", tmp_path / "mended.runs"
+    bug.touch()
+    asked = [SimpleNamespace(name=f"p{i}", bug=str(bug) if i % 2 else "") for i in range(16)]
+    machine = Machine("test").with_rate("mended", 0.01)
+    clock = functools.partial(WorkClock, machine)
+    with pytest.warns(UserWarning, match="is left out: .*a bug"):
+        library = anytime.measure(mended, asked, seconds=1.0, clock=clock, store=store)
+    assert len(library["mended"].problems) == 8
+    bug.unlink()
+    library = anytime.measure(mended, asked, seconds=1.0, clock=clock, store=store)
+    assert len(library["mended"].problems) == 16
+    assert len(store.read_text().splitlines()) == 1 + 16 + 8
+
+
+def test_a_campaign_that_cannot_begin_keeps_the_runs_that_it_was_to_replace(tmp_path):
+    store = tmp_path / "climb.runs"
+    asked = problems(4)
+    anytime.measure(climb, asked, seconds=1.0, clock=CLOCK, store=store)
+    before = store.read_bytes()
+    nobody = "dask://127.0.0.1:1"
+    with pytest.raises(AnytimeError, match="Dask"):
+        anytime.measure(
+            climb, asked, seconds=1.0, clock=CLOCK, store=store, resume=False, executor=nobody
+        )
+    assert store.read_bytes() == before
+    anytime.measure(climb, asked[:1], seconds=1.0, clock=CLOCK, store=store, resume=False)
+    assert len(store.read_text().splitlines()) == 2
+
+
+@pytest.mark.parametrize("executor", ["serial", "processes:1"])
+def test_a_score_that_ends_the_program_is_a_failure_of_its_problem(executor):
+    machine = Machine("test").with_rate("judged", 0.01)
+    with pytest.raises(AnytimeError, match=r"score of 'judged' failed .*SystemExit: no more"):
+        anytime.measure(
+            judged,
+            problems(6),
+            seconds=1.0,
+            clock=functools.partial(WorkClock, machine),
+            executor=executor,
+        )
+
+
+class Fleeting:
+    """A problem that can be sent and not received."""
+
+    def __init__(self, name):
+        self.name, self.how = name, "works"
+
+    def __reduce__(self):
+        return _lost, (self.name,)
+
+
+def _lost(name):
+    raise LookupError(f"{name} is \ud800 nowhere")
+
+
+def test_a_problem_that_cannot_be_received_is_left_out_and_told_as_it_is(tmp_path):
+    asked = [*fragiles("works", "works"), Fleeting("2 lost")]
+    store = tmp_path / "fragile.runs"
+    with pytest.warns(UserWarning, match=r"2 lost is left out: LookupError: .*\\ud800 nowhere"):
+        library = anytime.measure(
+            fragile, asked, seconds=1.0, clock=CLOCK, executor="processes:1", store=store
+        )
+    assert library["fragile"].problems == ("0 works", "1 works")
 
 
 def test_a_run_that_hangs_is_ended_and_left_out_and_the_others_stand(monkeypatch):

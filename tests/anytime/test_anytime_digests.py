@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,11 @@ WORDS = {"north", "south", "east", "west"}
 
 
 def test_a_digest_is_the_same_in_a_process_that_hashes_otherwise():
-    program = f"from anytime.digests import digest_of; print(digest_of({WORDS!r}, dict(a=1, b=2)))"
+    within = f"Fraction, {WORDS!r}, SimpleNamespace(doors=frozenset({WORDS!r}))"
+    program = (
+        "from fractions import Fraction; from types import SimpleNamespace\n"
+        f"from anytime.digests import digest_of; print(digest_of({within}, dict(a=1, b=2)))"
+    )
     for seed in ("1", "2"):
         told = subprocess.run(
             [sys.executable, "-c", program],
@@ -21,7 +27,8 @@ def test_a_digest_is_the_same_in_a_process_that_hashes_otherwise():
             text=True,
             check=True,
         )
-        assert told.stdout.strip() == digest_of(WORDS, {"b": 2, "a": 1})
+        room = SimpleNamespace(doors=frozenset(WORDS))
+        assert told.stdout.strip() == digest_of(Fraction, WORDS, room, {"b": 2, "a": 1})
 
 
 @pytest.mark.parametrize(

@@ -62,3 +62,37 @@ def test_a_file_of_somebody_else_is_refused_and_left_as_it_is(tmp_path, content)
     with pytest.raises(AnytimeError, match="not one of our files"):
         written(path, ["one"])
     assert path.read_text() == content
+
+
+def test_what_was_kept_makes_way_for_the_first_new_record_and_not_before(tmp_path):
+    path = tmp_path / "file"
+    written(path, ["one", "two"])
+    with opened(path, About(seed=1), Note, anew=True) as journal:
+        assert journal.kept == ()
+    assert written(path, []) == ["one", "two"]
+    with opened(path, About(seed=1), Note, anew=True) as journal:
+        journal.append(Note(text="three"))
+        journal.append(Note(text="four"))
+    assert written(path, [], seed=1) == ["three", "four"]
+
+
+def test_who_starts_anew_waits_for_another_that_writes(tmp_path):
+    path = tmp_path / "file"
+    with (
+        opened(path, About(seed=0), Note) as journal,
+        pytest.raises(AnytimeError, match="another process writes to it"),
+        opened(path, About(seed=0), Note, anew=True),
+    ):
+        pass
+    assert journal.kept == ()
+
+
+def test_a_file_of_somebody_else_makes_way_for_nothing(tmp_path):
+    path = tmp_path / "file"
+    path.write_text('{"precious": [1, 2]}\n')
+    with (
+        pytest.raises(AnytimeError, match="not one of our runs"),
+        opened(path, About(seed=0), Note, anew=True),
+    ):
+        pass
+    assert path.read_text() == '{"precious": [1, 2]}\n'

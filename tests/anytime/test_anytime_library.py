@@ -411,6 +411,9 @@ def test_a_folder_that_mixes_machines_keeps_its_doubt():
     there = ProfileLibrary(profiles={"find": small()}, machine=Machine("this", {}, "there"))
     assert there.updated(here).machine.host == "there"
     assert ProfileLibrary().updated(here).machine.host == "here"
+    simulated = ProfileLibrary(profiles={"path": small()}, machine=Machine("work", {}, ""))
+    assert there.updated(simulated).machine.host == "there"
+    assert here.updated(simulated).machine.host == ""
 
 
 def test_a_library_that_is_read_again_answers_as_before(tmp_path):
