@@ -19,9 +19,11 @@ from anytime.worker_letters import BEGUN, DONE, GO, JOB, LEAVE, POST, POSTED, ST
 
 if TYPE_CHECKING:
     from anytime.mail import Letter
+    from anytime.modules import Module
     from anytime.running import Run
     from anytime.workers import Worker
 
+STARTS = 60.0  # seconds that a worker process may take to import a module
 HUNG = 5.0  # seconds of real time without progress, after which a run on a work clock is cut
 STUBBORN = 16  # check-points after it was told to stop, after which such a run is cut
 _LISTENS = 0.002  # seconds between two questions whether a deadline's event has come
@@ -61,6 +63,21 @@ def serving() -> Generator[None]:
         yield
     finally:
         _Process.is_serving = False
+
+
+def warm(module: Module) -> None:
+    """Have a worker process that has imported an isolated module, if one can be had."""
+    if module.isolated is None or within():
+        return
+    from anytime.workers import workers
+
+    address = naming.address(module.function)
+    until = time.perf_counter() + STARTS
+    while (worker := workers.take(address, until)) is not None:
+        if address in worker.knows:
+            workers.give(worker)
+            return
+        workers.bury(worker)
 
 
 def perform(
@@ -127,7 +144,7 @@ class _Isolated:
         self.run, self.worker, self.may_step = current, worker, may_step
         self.begun = False
         self.broken = False
-        self._last: bytes | None = None  # a value that was posted and not looked at
+        self._values: list[bytes] = []  # the last that were posted and not looked at
 
     def live(self, job: bytes, until: float) -> tuple[bool, Fault | None]:
         """In real time."""
@@ -139,6 +156,7 @@ class _Isolated:
             while (letter := self._heard()) is not None:
                 self.begun = True
                 if letter.kind == BEGUN:
+                    self.run.begin()
                     continue
                 if letter.kind in (DONE, LEAVE):
                     complete, fault = pickle.loads(letter.content)
@@ -243,8 +261,10 @@ class _Isolated:
 
     def _seen(self, value: bytes) -> Any:
         """A value, which is looked at now if somebody wants to see each, else at the end."""
-        self._last = value
-        return pickle.loads(value) if self.run.observed else None
+        if self.run.observed:
+            return pickle.loads(value)
+        self._values = [*self._values[-1:], value]
+        return None
 
     def _read(self, content: bytes) -> tuple[float, float | None, tuple[float, ...], bytes | None]:
         at, valued, seen, count = POSTED.unpack_from(content)
@@ -253,12 +273,17 @@ class _Isolated:
         return at, None if math.isnan(seen) else seen, charges, content[ends:] if valued else None
 
     def _unpacked(self) -> Fault | None:
-        """Look at the last value, at the end alone; what cannot be read is none."""
-        if self._last is None:
-            return None
-        try:
-            self.run.value = pickle.loads(self._last)
-        except Exception as error:
+        """Look at the last value, at the end alone. Where it cannot be read that before it stands;
+        of earlier ones nothing is left."""
+        fault = None
+        while self._values:
+            try:
+                self.run.value = pickle.loads(self._values[-1])
+                return fault
+            except Exception as error:
+                fault = fault or Fault.of(error)
+                self._values.pop()
+                self.run.history.pop()
+        if fault is not None:
             self.run.history.clear()
-            return Fault.of(error)
-        return None
+        return fault

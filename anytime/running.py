@@ -99,6 +99,10 @@ class Run:
         if self._observe is not None:
             self._observe(value, change)
 
+    def begin(self) -> None:
+        """The module begins now: the time until then was no step of it."""
+        self._last_step = self.deadline.clock.now()
+
     def adopt(self, at: float, charges: Sequence[float]) -> None:
         """Take over a check-point that another process has counted, and when it was."""
         self.charges = self.charges or bool(charges)

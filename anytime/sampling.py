@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from anytime import isolation
 from anytime.clocks import Clock, Deadline
 from anytime.errors import AnytimeError
 from anytime.knobs import family_of
@@ -134,6 +135,8 @@ def _sample(
     )
     levels = tuple(index for *_, index in fed)
 
+    isolation.warm(module)  # a process that starts is no part of what is measured
+
     def once(budget: float) -> tuple[list[tuple[Any, Change]], Result, Run]:
         results = Thinned(4 * CHANGES)
         if how.rest:  # even a sleep of 0 s gives the processor away
@@ -208,7 +211,7 @@ def scored(module: Module, value: Any, problem: Any, key: str) -> float:
         score = float(module.score(value, problem))
     except AnytimeError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         reason = f"{type(error).__name__}: {error}"
         raise AnytimeError(
             f"the score of {module.name!r} failed on problem {key}: {reason}"

@@ -6,7 +6,6 @@ For whoever ships modules: call them from any test, or use the fixture of `anyti
 from __future__ import annotations
 
 import pickle
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from statistics import mean, median
@@ -14,7 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from anytime import naming
+from anytime import isolation, naming
 from anytime.clocks import Clock, Deadline, WallClock
 from anytime.errors import AnytimeError
 from anytime.measuring import measure
@@ -22,14 +21,12 @@ from anytime.modules import Limits, Module
 from anytime.pictures import duration, number
 from anytime.results import Change, Result
 from anytime.running import execute, seed_of
-from anytime.workers import workers
 
 EARLY = 0.5  # share of a run by which there should be something to use
 OFTEN = 3  # results of a run, at least
 LATE = 0.1  # of the seconds of a run, by which it may miss its deadline
 FALLS = 0.05  # of quality below the best so far, on average
 CUTS = (1, 2, 4, 8, 16, 32, 64)  # check-points after which a run is told to stop
-STARTS = 60.0  # seconds that a worker process may take to import the module
 
 
 class ConformanceError(AssertionError):
@@ -218,15 +215,13 @@ def is_interruptible(
     swallows the stop could never be ended here. Raises AnytimeError for a module that no worker
     can find, one that is not at the top level of a file.
     """
-    address = naming.address(module.function)
+    naming.address(module.function)
     try:
         pickle.dumps(module)
     except pickle.PicklingError as error:
         raise AnytimeError(f"whether {module.name} stops is tried in a worker: {error}") from None
-    worker = workers.take(address, time.perf_counter() + STARTS)
-    if worker is not None:
-        workers.give(worker)
     outside = module if module.isolated else replace(module, isolated=Limits())
+    isolation.warm(outside)
     for cut in CUTS:
         result, _ = _run(outside, problems[0], seconds, _Ticks(seconds / cut))
         if result.fault is not None:

@@ -68,6 +68,7 @@ class _PostingRun(Run):
     def __init__(self, module: Module, deadline: Deadline, mailbox: Mailbox) -> None:
         super().__init__(module, deadline)
         self._mailbox = mailbox
+        self._turn = threading.RLock()  # the module may have threads, and a letter is whole
         self._charged: list[float] = []
         self._due = False
         self._fresh: bytes | None = None
@@ -75,8 +76,9 @@ class _PostingRun(Run):
         self._watched = 0.0
 
     def charge(self, work: float) -> None:
-        super().charge(work)
-        self._charged.append(work)
+        with self._turn:
+            super().charge(work)
+            self._charged.append(work)
 
     def check(self) -> None:
         super().check()
@@ -90,17 +92,19 @@ class _PostingRun(Run):
         del self.history[:-1]
 
     def register(self, value: Any, *ignored: object) -> None:
-        self.check()
-        self.record(value)
-        self._post(POST)
-        if self._stopped or self.deadline.expired():
-            self.stop()
+        with self._turn:
+            self.check()
+            self.record(value)
+            self._post(POST)
+            if self._stopped or self.deadline.expired():
+                self.stop()
 
     def expired(self) -> bool:
-        self.check()
-        self._post(POST)
-        self.cut = self.cut or self._stopped or self.deadline.expired()
-        return self.cut
+        with self._turn:
+            self.check()
+            self._post(POST)
+            self.cut = self.cut or self._stopped or self.deadline.expired()
+            return self.cut
 
     def may_step(self) -> bool:
         self._post(POST)

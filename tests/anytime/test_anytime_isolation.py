@@ -5,14 +5,17 @@ import pickle
 import signal
 import threading
 import time
+from collections import namedtuple
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import anytime
-from anytime import AnytimeError, Deadline, Machine, Status, WallClock, WorkClock, naming
+from anytime import AnytimeError, Deadline, Machine, Status, WallClock, WorkClock, isolation, naming
 from anytime.isolation import HUNG
 from anytime.modules import Limits
+from anytime.running import execute
 from anytime.workers import workers
 from experiments.benchmarks import misbehaving
 from experiments.benchmarks.misbehaving import GOOD, MISBEHAVING
@@ -75,11 +78,35 @@ def _no_process_is_left():
         os.waitpid(-1, os.WNOHANG)
 
 
-def warm(module):
-    """Wait for a worker, so that a short contract is the module's own."""
-    worker = workers.take(naming.address(module.function), time.perf_counter() + LEFT)
-    assert worker is not None, workers.missing()
-    workers.give(worker)
+@anytime.module(isolated=True)
+def spots():
+    """Its last results are of a type that its worker alone knows."""
+    global Better
+    Better = namedtuple("Better", "row column")
+    for row in range(3):
+        yield (row, row) if row < 2 else Better(2, 2)
+
+
+@anytime.module(quality=lambda value: value, isolated=True)
+def slowly(start):
+    time.sleep(0.05)
+    yield start
+
+
+@anytime.module(isolated=True)
+def crowded(steps):
+    run = anytime.here()
+
+    def work():
+        for step in range(steps):
+            run.charge(1)
+            run.register(step)
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
 
 
 # What a run gives
@@ -101,6 +128,32 @@ def test_each_result_is_told_to_whoever_listens():
 def test_a_large_result_travels_as_well():
     result = anytime.run(larger, 200_000, seconds=LEFT)
     assert np.array_equal(result.value, np.arange(200_000))
+
+
+@pytest.mark.parametrize("observe", [None, lambda value, change: None])
+def test_a_last_result_that_cannot_be_read_leaves_the_one_before_it(observe):
+    result = anytime.run(spots, seconds=LEFT, on_result=observe)
+    assert (result.value, len(result.history)) == ((1, 1), 2)
+    assert "Better" in result.fault.message
+
+
+def test_the_start_of_a_worker_is_no_step_of_its_module():
+    workers.close()
+    _, run = execute(count, (3,), Deadline.after(LEFT))
+    assert sum(run.step_seconds) < 0.5 * run.history[-1].seconds
+
+
+def test_the_start_of_a_worker_is_no_time_of_what_is_measured():
+    workers.close()
+    asked = [SimpleNamespace(name=f"p{i}", start=0.5) for i in range(2)]
+    library = anytime.measure(slowly, asked, seconds=0.1)
+    assert [len(run.seconds) for run in library["slowly"].recordings] == [1, 1]
+
+
+def test_what_its_threads_register_arrives_whole():
+    machine = Machine("m").with_rate("crowded", 1e-6)
+    result = anytime.run(crowded, 50, deadline=Deadline.after(1.0, WorkClock(machine)))
+    assert (len(result.history), result.work, result.fault) == (150, 150.0, None)
 
 
 def test_its_randomness_is_that_of_a_run_in_process():
@@ -174,7 +227,7 @@ def test_who_looks_on_and_fails_ends_the_run_with_a_fault_as_in_process():
 
 @pytest.mark.parametrize("name", sorted(set(MISBEHAVING) - {"leaks", "floods_heavily"}))
 def test_whatever_a_module_does_its_last_good_result_stands(name):
-    warm(MISBEHAVING[name])
+    isolation.warm(MISBEHAVING[name])
     result = anytime.run(MISBEHAVING[name], seconds=0.3)
     assert result.value == GOOD
     assert result.status is Status.INTERRUPTED
@@ -245,7 +298,7 @@ def test_threads_may_run_isolated_modules_at_the_same_time():
 
 
 def test_a_worker_that_is_killed_from_outside_is_replaced():
-    warm(count)
+    isolation.warm(count)
     worker = workers.take(naming.address(count.function), time.perf_counter() + LEFT)
     assert worker is not None, workers.missing()
     os.kill(worker.process.pid, signal.SIGKILL)
