@@ -111,7 +111,10 @@ def table_of(join: Join, made: Mapping[str, Table], output: bool) -> Table:
 
     made: the tables of its arguments by label. An input that is a test is always there and right.
     """
-    sources = [made.get(getattr(argument, "label", "")) for argument in join.arguments]
+    sources = [
+        made[argument.label] if isinstance(argument, Call | Join) else None
+        for argument in join.arguments
+    ]
     feeds = tuple(source.label for source in sources if source is not None)
     every = [KNOWN[1:] if source is None else source.levels for source in sources]
     shape = tuple(len(levels) for levels in every)

@@ -114,7 +114,8 @@ def course_of(missions: Sequence[Legs], shares: tuple[float, ...]) -> Course | N
     rows = np.array([row for legs in missions for row in _frames(legs, forecast)])
     thinking = [leg.thinking for legs in missions for leg in legs if leg.thinking > 0]
     contract = float(np.median(thinking)) if thinking else sum(shares)
-    planned = float(np.mean([leg.planned for legs in missions for leg in legs if leg.planned > 0]))
+    in_hand = [leg.planned for legs in missions for leg in legs if leg.planned > 0]
+    planned = float(np.mean(in_hand)) if in_hand else 0.0
     beyond = np.quantile(rows[:, 0], np.arange(BINS) / BINS)
     beyond[0] = 0.0
     bins = np.searchsorted(beyond, rows[:, 0], side="right") - 1
@@ -173,8 +174,11 @@ def _between(one: Course, other: Course) -> Course:
         name: (getattr(one, name) + getattr(other, name)) / 2.0
         for name in ("contract", "planned", "error")
     }
+    excess, others = one.forecast.whole - 1.0, other.forecast.whole - 1.0
+    # It falls by a factor; but who saw all may have walked no more than the route said, or less.
+    falls = excess > 0 and others > 0
     forecast = Forecast(
-        1.0 + float(np.sqrt((one.forecast.whole - 1.0) * (other.forecast.whole - 1.0))),
+        1.0 + (float(np.sqrt(excess * others)) if falls else (excess + others) / 2.0),
         (one.forecast.parts + other.forecast.parts) / 2.0,
         (one.forecast.ratios + other.forecast.ratios) / 2.0,
         (one.forecast.trust + other.forecast.trust) / 2.0,

@@ -86,6 +86,8 @@ class Runs:
             raise AnytimeError(
                 f"seconds has shape {self.seconds.shape}; it must be {self.quality.shape[1:]}"
             )
+        if not np.isfinite(self.seconds).all() or (self.seconds < 0).any():
+            raise AnytimeError("seconds must be finite numbers >= 0")
         if (np.diff(self.seconds) <= 0).any():
             raise AnytimeError("seconds must increase")
         if not (np.isfinite(self.quality).all() and np.isfinite(self.seen).all()):

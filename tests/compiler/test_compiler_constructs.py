@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass
+from statistics import mean
 from types import SimpleNamespace
 
 import pytest
@@ -354,6 +355,23 @@ def test_a_branch_keeps_what_it_promises(schedules):
     for seconds in (0.031, 0.081, 0.4):
         found = [run(schedule, seconds, scene).value or 0.0 for scene in SCENES]
         assert sum(found) / len(found) == pytest.approx(schedule.promise(seconds), abs=0.03)
+
+
+def test_an_input_of_the_program_may_be_the_test():
+    @compiler.program
+    def told(light, late):
+        return compiler.branch(late, night(light), day(light), chance=0.5)
+
+    scenes = [SimpleNamespace(name=s.name, light=s.light, late=s.light < 0.5) for s in SCENES]
+    schedule = compiler.compile(told, anytime.measure(told, scenes, seconds=1.0, clock=clock))
+    for seconds in (0.031, 0.081, 0.4):
+        ran = [
+            schedule.run(seconds, clock=clock(), light=scene.light, late=scene.late)
+            for scene in scenes
+        ]
+        assert mean(result.value or 0.0 for result in ran) == pytest.approx(
+            schedule.promise(seconds), abs=0.03
+        )
 
 
 # Kept in files, and explained

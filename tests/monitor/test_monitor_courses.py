@@ -55,6 +55,22 @@ def state(time=0.0, to_go=140.0, in_hand=16.0, energy=0.0, walked=0.0, **changes
     return replace(base, walked=walked, **changes)
 
 
+@given(st.floats(0.7, 2.0), st.floats(0.7, 2.0))
+def test_half_way_between_two_courses_one_walks_as_far_as_between(one, other):
+    courses = [course(one, thinking=0.5, noise=0.0), course(other, thinking=2.0, noise=0.0)]
+    wholes = [each.forecast.whole for each in refined(courses)]
+    assert len(wholes) == 3
+    assert min(wholes[0], wholes[2]) <= wholes[1] + 1e-9 <= max(wholes[0], wholes[2]) + 2e-9
+
+
+def test_missions_that_went_by_obstacle_avoidance_alone_make_a_course_as_well():
+    blind = [[replace(leg, planned=0.0) for leg in legs(seed=seed, noise=0.2)] for seed in range(4)]
+    made = course_of(blind, (0.1, 0.0))
+    assert made.planned == 0.0
+    worth, speed = solve(MISSION, course(), 160.0).walking(0.0, 100.0, 0.0, 0.1, made)
+    assert np.isfinite([worth, speed]).all()
+
+
 def test_what_always_happened_is_foreseen_exactly():
     made = course(noise=0.0)
     for to_go in (160.0, 96.0, 32.0):
