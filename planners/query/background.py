@@ -3,30 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Generator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from planners.query.querying import Query
-
-
-class Turns:
-    """A lock that is handed on in the order of asking, so that a search that takes it again and
-    again keeps nobody waiting for longer than one turn."""
-
-    def __init__(self) -> None:
-        self._gate = threading.Lock()
-        self._lock = threading.Lock()
-
-    @contextmanager
-    def take(self) -> Generator[None]:
-        with self._gate:
-            self._lock.acquire()
-        try:
-            yield
-        finally:
-            self._lock.release()
 
 
 class Worker(threading.Thread):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from anytime.clocks import Clock, Deadline, WorkClock, is_number
 from anytime.errors import AnytimeError
 from planners.query import choosing, genetics
-from planners.query.background import Share, Turns, Worker
+from planners.query.background import Share, Worker
 from planners.query.choices import Address, Choices, Solution
 from planners.query.errors import NativeError
 from planners.query.memory import Memory
@@ -67,7 +68,10 @@ class Query:
         self._sources = Sources(self._memory)
         if (text := _text(model)) is not None:
             self._sources.expect(text)
-        self._turns = Turns()
+        # A search takes the lock again and again; who asks holds the gate until he has had it, and
+        # a search passes through that, so that nobody waits for longer than one turn. Both are
+        # taken by `with` alone: an interrupt between taking and releasing would keep them for ever.
+        self._gate, self._lock = threading.Lock(), threading.Lock()
         self._best: Solution | None = None
         self.turn = 1  # generations of a turn
 
@@ -92,7 +96,7 @@ class Query:
 
         Raises AnytimeError before the first generation.
         """
-        with self._turns.take():
+        with self._gate, self._lock:
             if self._best is None:
                 self._best = self._solution(self._memory["best"])
             return self._best
@@ -100,7 +104,7 @@ class Query:
     @property
     def values(self) -> NDArray[np.float64]:
         """What each individual of the last generation was worth, float64 [size], scouts last."""
-        with self._turns.take():
+        with self._gate, self._lock:
             begin = self._memory["side"] * (self.size + 1)
             return self._memory.blocks["values"][begin : begin + self.size].copy()
 
@@ -113,7 +117,9 @@ class Query:
         """Make some generations; fewer if the best value comes to `until`. How many were made."""
         made = 0
         while made < generations:
-            with self._turns.take():
+            with self._gate:
+                pass
+            with self._lock:
                 self.world.take_over()
                 begun = time.perf_counter()
                 done = self._evolve(min(self.turn, generations - made), until)
@@ -182,7 +188,7 @@ class Query:
         outside the range that the model asks for is drawn anew nevertheless.
         Raises AnytimeError for an address that the model never asked for.
         """
-        with self._turns.take():
+        with self._gate, self._lock:
             fixed = [(self._cell(address), value) for address, value in choices.items()]
             self._memory.blocks["fixed"][:] = np.nan
             for cell, value in fixed:
@@ -198,7 +204,7 @@ class Query:
         """
         if self.generations == 0:
             self.step()
-        with self._turns.take():
+        with self._gate, self._lock:
             self.world.take_over()
             genetics.adopt(self._memory.address, self._valued(choices, constrained=True))
             self._best = None
@@ -209,7 +215,7 @@ class Query:
         inf for NaN, and for a run of more than 8192 choices. Raises AnytimeError for an address
         that the model never asked for.
         """
-        with self._turns.take():
+        with self._gate, self._lock:
             self.world.take_over()
             return self._valued(choices)
 
