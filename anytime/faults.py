@@ -6,7 +6,6 @@ Nothing here acts unless somebody hands a schedule in; the command line does so 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import numpy as np
 
 from anytime.clocks import WorkClock
 from anytime.errors import AnytimeError
+from anytime.files import read_toml
 from anytime.machines import Machine
 from anytime.modules import Module
 from anytime.running import charge, seed_of
@@ -112,20 +112,13 @@ def read_schedule(path: Path, known: Mapping[str, Iterable[str]]) -> Schedule:
 
     known: the kinds there are, by what may be faulty. Raises AnytimeError, in one line.
     """
+    stored = read_toml(path, _File, "file of faults")
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-        stored = msgspec.convert(content, _File)
         faults = [
             Fault(each.kind, each.begins, each.ends, each.what, each.chance)
             for each in stored.fault
         ]
-    except FileNotFoundError:
-        raise AnytimeError(f"{path}: no such file of faults") from None
-    except OSError as error:
-        raise AnytimeError(f"{path}: {error.strerror or error}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise AnytimeError(f"{path}: not TOML: {error}") from None
-    except (msgspec.ValidationError, ValueError) as error:
+    except ValueError as error:
         raise AnytimeError(f"{path}: {error}") from None
     for fault in faults:
         if fault.what not in known:

@@ -9,6 +9,7 @@ import math
 import os
 import stat
 import tempfile
+import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -26,6 +27,7 @@ class Stored(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
 
 
 Record = TypeVar("Record", bound=Stored)
+Table = TypeVar("Table", bound=msgspec.Struct)
 
 
 class Disk:
@@ -212,3 +214,26 @@ def _refuse_non_finite(value: Any, where: str, path: Path, depth: int = 0) -> No
     elif isinstance(value, list):
         for index, item in enumerate(value):
             _refuse_non_finite(item, f"{where}[{index}]", path, depth + 1)
+
+
+def read_toml(path: Path, kind: type[Table], what: str) -> Table:
+    """A TOML file that people write, as a struct. what: it is, as in "no such mission file".
+
+    Raises AnytimeError, in one line with the path, for whatever is wrong with it.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise AnytimeError(f"{path}: no such {what}") from None
+    except IsADirectoryError:
+        raise AnytimeError(f"{path} is a folder; give a {what}") from None
+    except OSError as error:
+        raise AnytimeError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, RecursionError) as error:  # of the text, its bytes, a number's digits
+        raise AnytimeError(f"{path}: not TOML: {error}") from None
+    try:
+        return msgspec.convert(content, kind)
+    except msgspec.ValidationError as error:
+        message, _, where = str(error).partition(" - at `$.")
+        place = f"{where.rstrip('`')}: " if where else ""
+        raise AnytimeError(f"{path}: {place}{message}") from None

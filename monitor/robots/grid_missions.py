@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +10,7 @@ import msgspec
 import numpy as np
 
 from anytime.errors import AnytimeError
+from anytime.files import read_toml
 from anytime.machines import Machine
 from monitor.missions import Energy, Mission, News, Value
 from monitor.robots.grid import Scene
@@ -110,7 +110,7 @@ def read_mission(
     path, for whatever is wrong.
     """
     path = Path(path)
-    file = _parse(path)
+    file = read_toml(path, _File, "mission file")
     floor = read_map(map_path or path.parent / file.world.map)
     replaced = map_path is not None
     begin = start or (None if replaced else file.world.start)
@@ -164,23 +164,6 @@ def _news(table: _News | None) -> News | None:
         return None
     value = Value(table.kind, table.worth, table.seconds)  # pyright: ignore[reportArgumentType]
     return News(table.at, value)
-
-
-def _parse(path: Path) -> _File:
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise AnytimeError(f"{path}: no such mission file") from None
-    except IsADirectoryError:
-        raise AnytimeError(f"{path} is a folder; give a mission file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AnytimeError(f"{path}: not TOML: {error}") from None
-    try:
-        return msgspec.convert(content, _File)
-    except msgspec.ValidationError as error:
-        what, _, where = str(error).partition(" - at `$.")
-        place = f"{where.rstrip('`')}: " if where else ""
-        raise AnytimeError(f"{path}: {place}{what}") from None
 
 
 def _known(table: str, given: Iterable[str], known: Iterable[str]) -> None:

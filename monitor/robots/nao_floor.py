@@ -119,10 +119,14 @@ def plan_of(scene: Scene) -> ScenePlan:
     rows = math.ceil((top - min(ys) + _BORDER) / RESOLUTION)
     columns = math.ceil((max(xs) + _BORDER - left) / RESOLUTION)
     free = np.ones((rows, columns), bool)
-    for row in range(rows):
-        for column in range(columns):
-            at = (left + (column + 0.5) * RESOLUTION, top - (row + 0.5) * RESOLUTION)
-            free[row, column] = all(o.clearance(at) > 0 for o in scene.obstacles)
+    for obstacle in scene.obstacles:
+        reach = obstacle.radius or math.hypot(*(obstacle.size or ()))
+        middle, side = (top - obstacle.at[1]) / RESOLUTION, (obstacle.at[0] - left) / RESOLUTION
+        most = math.ceil(reach / RESOLUTION) + 1
+        for row in range(max(int(middle) - most, 0), min(int(middle) + most + 1, rows)):
+            for column in range(max(int(side) - most, 0), min(int(side) + most + 1, columns)):
+                at = (left + (column + 0.5) * RESOLUTION, top - (row + 0.5) * RESOLUTION)
+                free[row, column] &= obstacle.clearance(at) > 0
     empty = ScenePlan(left, top, Floor(free, (0, 0), (0, 0), 1.0))
     start, goal = empty.cell(*scene.start_in_world[:2]), empty.cell(*scene.goal.at)
     return replace(empty, floor=Floor(free, start, goal, 1.0 / RESOLUTION, RESOLUTION, density=0.2))

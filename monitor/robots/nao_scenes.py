@@ -6,17 +6,18 @@ import math
 import tomllib
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from anytime.errors import AnytimeError
+from anytime.files import read_toml
 from monitor.robots.nao_body import Pose
 from monitor.robots.nao_noise import NOISELESS, Noise
 from monitor.robots.nao_world import Obstacle, Vector
 from planners.nao import POSTURES, Body
 from sensing.sonar import Sonars
 
+FAR = 50.0  # metres from the origin within which a scene takes place
 _FARTHEST = 60.0  # seconds ahead that a goal's way is foreseen
 
 
@@ -73,6 +74,14 @@ class Scene:
         numbers = (*self.start_in_world, *self.goal.at, *self.goal.velocity)
         if not all(map(math.isfinite, numbers)):
             raise AnytimeError("start and goal must be finite numbers")
+        if math.hypot(*self.goal.velocity) > 1.0:
+            raise AnytimeError(f"the goal's velocity is {self.goal.velocity}; 1 m/s is the most")
+        places = [self.start_in_world[:2], self.goal.at, *(each.at for each in self.obstacles)]
+        for x, y in places:
+            if max(abs(x), abs(y)) > FAR:
+                raise AnytimeError(
+                    f"something is at ({x:g}, {y:g}); a scene reaches {FAR:g} m from the origin"
+                )
         if not 0.0 <= self.secure < math.inf:
             raise AnytimeError(f"secure is {self.secure} m; it must be 0 (never) or more")
         radius = Body().radius
@@ -142,7 +151,7 @@ def read_scene(path: Path, *, seed: int | None = None, noise: bool = True) -> Sc
 
     Raises AnytimeError, in one line with the path, for whatever is wrong.
     """
-    file = _parse(path)
+    file = read_toml(path, _File, "scene file")
     try:
         scene = Scene(
             name=file.name or path.stem,
@@ -167,28 +176,9 @@ def is_scene(path: Path) -> bool:
     """Whether a TOML file is about a NAO rather than a grid mission: it has a goal in metres."""
     try:
         goal = tomllib.loads(path.read_text(encoding="utf-8")).get("goal")
-    except (OSError, ValueError):  # whoever reads it in earnest says what is wrong
+    except (OSError, ValueError, RecursionError):  # whoever reads it in earnest says what is wrong
         return False
     return isinstance(goal, dict) and "at" in goal
-
-
-def _parse(path: Path) -> _File:
-    try:
-        content: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise AnytimeError(f"{path}: no such scene file") from None
-    except IsADirectoryError:
-        raise AnytimeError(f"{path} is a folder; give a scene file") from None
-    except OSError as error:
-        raise AnytimeError(f"{path}: cannot be read: {error.strerror}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AnytimeError(f"{path}: not TOML: {error}") from None
-    try:
-        return msgspec.convert(content, _File)
-    except msgspec.ValidationError as error:
-        what, _, where = str(error).partition(" - at `$.")
-        place = f"{where.rstrip('`')}: " if where else ""
-        raise AnytimeError(f"{path}: {place}{what}") from None
 
 
 def _obstacle(number: int, given: _Obstacle) -> Obstacle:

@@ -38,6 +38,8 @@ def test_the_shipped_mission_is_read():
         ("find_path = 0.001", "find_a_path = 0.001", "find_a_path"),
         ("speed = 7.499", "velocity = 7.499", "velocity"),
         ("[value]", "[value", "not TOML"),
+        ("price = 0.2", f"price = {'9' * 5000}", "not TOML"),
+        ("price = 0.2", f"price = {'[' * 5000}", "not TOML"),
         ("../office.yaml", "../nowhere.yaml", "nowhere.yaml"),
     ],
 )
