@@ -39,6 +39,8 @@ def replay(options: argparse.Namespace) -> Answer:
             server.server_close()
         return Answer("")
     page = options.output or options.log[0].with_suffix(".html")
+    if any(page.resolve() == path.resolve() for path in options.log):
+        raise AnytimeError(f"{page} is the log itself; give another file with -o")
     logs = [read_log(path) for path in options.log]
     write_page(logs, page)
     return Answer(str(page), {"page": str(page), "frames": [len(log.frames) for log in logs]})

@@ -33,6 +33,9 @@ class LogServer(ThreadingHTTPServer):
         """Where to look."""
         return f"http://127.0.0.1:{self.server_address[1]}/"
 
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Say nothing of a viewer that went away: the terminal belongs to the mission."""
+
     def server_close(self) -> None:
         self.closing.set()
         super().server_close()
@@ -56,13 +59,13 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         # A page elsewhere whose name was rebound to 127.0.0.1 carries its own name here.
-        if self.headers.get("Host", "").rpartition(":")[0] not in ("127.0.0.1", "localhost"):
+        if self.headers.get("Host", "").partition(":")[0] not in ("127.0.0.1", "localhost"):
             self._answer(403, "text/plain", b"only for 127.0.0.1\n")
             return
         try:
             if self.path == "/":
                 page = render_all([read_log(self.server.log)], live=True)
-                self._answer(200, "text/html; charset=utf-8", page.encode())
+                self._answer(200, "text/html; charset=utf-8", page.encode(errors="replace"))
             elif self.path == "/data":
                 data = json.dumps(page_data([read_log(self.server.log)]), allow_nan=False)
                 self._answer(200, "application/json", data.encode())

@@ -14,6 +14,13 @@ if TYPE_CHECKING:
     from monitor.robots.grid_missions import GridMission
 
 
+_OF_GRIDS = {
+    "map": None, "start": None, "goal": None, "scenario": None, "library": None, "regret": 0,
+    "policy": "optimal",
+}  # fmt: skip
+"""Options of `anytime run` that a NAO's scene has no use for, as they are by default."""
+
+
 def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "run", run, "live a monitored mission and write its page")
@@ -24,7 +31,7 @@ def declare(commands: Any) -> None:
         "--goal", type=_cell, action="append", metavar="ROW,COLUMN", help="again for each to visit"
     )
     parser.add_argument("--scenario", type=natural, metavar="N", help="the N-th of FILE.scen")
-    parser.add_argument("--seed", type=natural, default=0, help="of the mission (default 0)")
+    parser.add_argument("--seed", type=natural, help="default: 0, or what a scene says")
     parser.add_argument(
         "--policy",
         default="optimal",
@@ -99,6 +106,9 @@ def run(options: argparse.Namespace) -> Answer:
             raise AnytimeError(
                 "--faults is for a grid mission; a NAO's are anytime nao-sim --fault"
             )
+        for name, ignored in _OF_GRIDS.items():
+            if getattr(options, name) != ignored:
+                raise AnytimeError(f"--{name} is for a grid mission, not for a NAO's scene")
         return _run_nao(options)
     if options.robot != "simulated":
         raise AnytimeError(f"--robot {options.robot} is for a NAO's scene, not for a grid mission")
@@ -129,7 +139,7 @@ def run(options: argparse.Namespace) -> Answer:
         if options.clock == "work":
             clock = FaultyClock(grid.machine, faults)
     log = options.log / "mission.jsonl"
-    report = briefing.live(monitor, options.seed, clock=clock, log=log, faults=faults)
+    report = briefing.live(monitor, options.seed or 0, clock=clock, log=log, faults=faults)
     if options.regret:
         shares = briefing.contracts.shares
         with progress("living other decisions") as bar:
@@ -201,9 +211,9 @@ def _run_nao(options: argparse.Namespace) -> Answer:
     log = options.log / "mission.jsonl"
     report = briefing.log(robot, scene, log)
     robot.body.close()
+    page = write_page([read_log(log)], options.log / "mission.html")
     if options.drift:
         write_drift(options.drift, robot.drift)
-    page = write_page([read_log(log)], options.log / "mission.html")
     told = (
         f"{robot.apart():.3f} m from the goal by odometry, {robot.plans} plans, {robot.falls} falls"
     )
@@ -237,7 +247,7 @@ def nao_sim(options: argparse.Namespace) -> Answer:
     if options.port > 65535:
         raise AnytimeError(f"port is {options.port}; it must be 0 (any) to 65535")
     file = Path(options.scene)
-    if not file.suffix:
+    if not file.is_file() and len(file.parts) == 1 and not file.suffix:
         file = Path(str(files("experiments") / "data" / "scenes")) / f"{options.scene}.toml"
         if not file.exists():
             known = ", ".join(sorted(each.stem for each in file.parent.glob("*.toml")))

@@ -373,7 +373,7 @@ class NaoRobot:
             done=execution.done if execution else 0,
             current=action,
             elapsed=now - execution.began if execution and action else 0.0,
-            drift=self.drift.mean,
+            drift=float(self.drift.mean),
             effort=self.planning.effort,
             collision=self.planning.collision,
             body=self.figures,

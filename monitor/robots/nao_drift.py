@@ -24,11 +24,12 @@ class Drift:
 
     def learn(self, turned: float) -> Drift:
         """The posterior after one more stand-up."""
-        gain = self.variance / (self.variance + self.noise**2)
+        total = self.variance + self.noise**2
+        # 1 - gain would be 0 for a variance of which nothing is known.
         return replace(
             self,
-            mean=self.mean + gain * (turned - self.mean),
-            variance=(1.0 - gain) * self.variance,
+            mean=self.mean + self.variance / total * (turned - self.mean),
+            variance=self.noise**2 / total * self.variance,
         )
 
 

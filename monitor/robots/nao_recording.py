@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
+import numpy as np
 
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
@@ -214,14 +215,14 @@ def _lines(path: Path) -> Iterator[dict[str, Any]]:
 
 
 def _plain(value: Any) -> Any:
+    value = value.item() if isinstance(value, np.generic) else value  # which JSON does not know
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(each) for each in value]
     if isinstance(value, float) and not math.isfinite(value):
         return {"float": repr(float(value))}
-    # numpy's numbers are floats and bools too, but not JSON's
-    return float(value) if isinstance(value, float) else value
+    return value
 
 
 def _lively(value: Any) -> Any:

@@ -235,7 +235,7 @@ def serve(
         ready(session.endpoints()[0])
         period = None if rate is None else max(0.001, 0.02 / rate)
         while not done.wait(period):
-            stage.live()
+            stage.tick()
     finally:
         stage.close()
         session.close()

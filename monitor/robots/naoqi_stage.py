@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from anytime.clocks import Clock
-from monitor.robots.nao_body import Action, NaoBody, Outcome, Reading
+from monitor.robots.nao_body import Action, LinkLostError, NaoBody, Outcome, Reading
 from monitor.robots.nao_clocks import PacedClock, ToldClock
 from monitor.robots.nao_faults import Fault, Faulty
 from monitor.robots.nao_scenes import Scene
@@ -20,6 +20,7 @@ from monitor.robots.simulated_nao import SimulatedNao
 
 _POSTURE = "PostureChanged"
 _FAILED = "ALMotion/MoveFailed"
+_BACK = 0.02  # seconds between two looks whether a lost link is back
 _SILENT = 0.2  # seconds that lock-step waits for a command that it was told of
 
 
@@ -31,7 +32,7 @@ class Stage:
         self.commands = 0  # how many moveTo and goToPosture there were
         self.begun = False
         self.listened = False  # whether somebody subscribed to the sonars
-        self.awake = True
+        self.awake, self.closed = True, False
         self.watch = Watch(time.perf_counter)
         self.lock = threading.Condition()
         self.memory: dict[str, Any] = {FALLEN: 0.0, _POSTURE: scene.posture, _FAILED: []}
@@ -49,8 +50,8 @@ class Stage:
             self.clock: Clock = ToldClock(start) if self.rate is None else PacedClock(self.rate)
             self.simulated = SimulatedNao(scene, self.clock)
             self.body: NaoBody = Faulty(self.simulated, self._faults)
-            self.awake, self.commands = True, 0
-            self.live()
+            self.awake, self.closed, self.commands = True, False, 0
+            self.tick()
 
     def command(self, kind: str, begin: Callable[[NaoBody], Action]) -> Any:
         """Tell the body something; the future of whether it was done."""
@@ -77,11 +78,26 @@ class Stage:
                 self.live()
 
     def live(self) -> Reading:
-        """Live up to now: raise what there is to raise, answer the calls that came to their end."""
+        """Live up to now: raise what there is to raise, answer the calls that came to their end.
+
+        Who asks while the link is lost hears nothing before it is back.
+        """
+        with self.lock:
+            while (reading := self.tick()) is None:
+                if self.closed:
+                    raise RuntimeError("the link is lost, and the simulator ends")
+                self.lock.wait(_BACK)
+            return reading
+
+    def tick(self) -> Reading | None:
+        """The same, without waiting for a link that is lost: then None."""
         with self.lock:
             if self.watch.silent and any(kind == "walk" for _, kind, _, _ in self._waiting):
                 self.body.stop()
-            reading = self.body.read()
+            try:
+                reading = self.body.read()
+            except LinkLostError:
+                return None
             if reading.fallen and not self.memory[FALLEN]:
                 self.awake = False
             self.remember(FALLEN, float(reading.fallen))
@@ -124,6 +140,7 @@ class Stage:
     def close(self) -> None:
         """Answer all calls that still wait: a promise that is dropped is an error at its caller."""
         with self.lock:
+            self.closed = True
             for _, _, _, promise in self._waiting:
                 promise.setValue(False)
             self._waiting.clear()

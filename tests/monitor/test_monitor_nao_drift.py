@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from anytime.__main__ import main
 from anytime.errors import AnytimeError
 from monitor.endings import Ending
+from monitor.logs import read_log
 from monitor.robots.nao_drift import Drift, read_drift, write_drift
 from monitor.robots.nao_missions import brief
 from monitor.robots.nao_scenes import Goal, Scene
@@ -26,6 +28,12 @@ def test_each_time_that_it_stands_up_it_is_surer():
     assert sorted((each.variance for each in believed), reverse=True) == [
         each.variance for each in believed
     ]
+
+
+def test_who_knows_nothing_believes_the_first_time_that_it_stands_up():
+    learnt = Drift(0.0, 1e20, 0.02).learn(0.13)
+    assert learnt.mean == pytest.approx(0.13)
+    assert learnt.variance == pytest.approx(0.02**2)
 
 
 def surprise(report):
@@ -92,6 +100,33 @@ def test_the_command_reads_and_writes_it(tmp_path, capsys):
     file.write_text("[]")
     assert main(run) == 2
     assert "drift.json" in capsys.readouterr().err
+
+
+def test_where_it_cannot_be_written_the_page_is_there_all_the_same(tmp_path, capsys):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[goal]\nat = [0.3, 0.0]\n")
+    nowhere = Path("/proc/drift.json")
+    assert main(["run", str(scene), "--drift", str(nowhere), "--log", str(tmp_path)]) == 2
+    assert "drift.json" in capsys.readouterr().err
+    assert (tmp_path / "mission.html").exists()
+
+
+def test_the_seed_is_that_of_the_scene_unless_another_is_given(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("seed = 5\n[goal]\nat = [0.3, 0.0]\n")
+    for asked, told in (([], 5), (["--seed", "3"], 3)):
+        main(["run", str(scene), "--log", str(tmp_path), *asked])
+        assert read_log(tmp_path / "mission.jsonl").mission.seed == told
+
+
+@pytest.mark.parametrize(
+    "asked", ["--policy=paper", "--map=a.map", "--start=1,1", "--goal=1,1", "--regret=3"]
+)
+def test_what_only_a_robot_on_cells_can_do_is_refused(tmp_path, capsys, asked):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[goal]\nat = [0.3, 0.0]\n")
+    assert main(["run", str(scene), asked]) == 2
+    assert "is for a grid mission" in capsys.readouterr().err
 
 
 def test_a_robot_on_cells_learns_no_drift(tmp_path, capsys):

@@ -413,6 +413,21 @@ def under(kind, scene=STANDS, begins=0.0, ends=math.inf):
     return Faulty(SimulatedNao(scene), [Fault(kind, begins, ends)])
 
 
+def test_a_server_whose_link_is_lost_on_purpose_is_silent_until_it_is_back(rig):
+    server = rig.keep(ServedNao("--fault", "link:0:0.5"))
+    with contextlib.closing(NaoqiBody(server.url, timeout=5.0)) as there:
+        assert there.read().posture == "Sit"
+    server.close()
+    assert server.process.returncode == 0
+
+
+@pytest.mark.parametrize("lockstep", [(), ("--lockstep",)])
+def test_a_server_whose_link_never_comes_back_begins_and_ends_nevertheless(rig, lockstep):
+    server = rig.keep(ServedNao(*lockstep, "--fault", "link"))
+    server.close()
+    assert server.process.returncode == 0
+
+
 def test_a_lost_link_ends_what_was_in_execution_and_comes_back():
     nao = under("link", begins=1.0, ends=2.0)
     action = nao.walk(1.0, 0.0, 0.0)

@@ -14,6 +14,7 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace as replace_struct
 
+from anytime.__main__ import main
 from anytime.errors import AnytimeError
 from monitor.endings import Ending
 from monitor.logs import LogWriter, read_log, write_log
@@ -280,6 +281,21 @@ def test_only_this_machine_may_look(live):
     asked = urllib.request.Request(server.url, headers={"Host": "evil.example"})
     with pytest.raises(urllib.error.HTTPError, match="403"):
         urllib.request.urlopen(asked, timeout=20)
+
+
+def test_who_names_no_port_may_look_as_well(live):
+    server, _ = live
+    asked = urllib.request.Request(server.url, headers={"Host": "127.0.0.1"})
+    with urllib.request.urlopen(asked, timeout=20) as answer:
+        assert answer.status == 200
+
+
+def test_a_page_does_not_take_the_place_of_its_log(live, capsys):
+    log = live[1].path
+    before = log.read_bytes()
+    assert main(["replay", str(log), "-o", str(log)]) == 2
+    assert "is the log itself" in capsys.readouterr().err
+    assert log.read_bytes() == before
 
 
 def test_what_is_no_log_is_not_served(tmp_path):
