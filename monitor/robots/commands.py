@@ -21,6 +21,9 @@ _OF_GRIDS = {
 """Options of `anytime run` that a NAO's scene has no use for, as they are by default."""
 
 
+_FASTEST = 1000.0  # times real time that a served NAO can run at
+
+
 def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "run", run, "live a monitored mission and write its page")
@@ -244,6 +247,8 @@ def nao_sim(options: argparse.Namespace) -> Answer:
     from monitor.robots.nao_scenes import read_scene
     from monitor.robots.naoqi_server import end_without_teardown, serve, until_stdin_closes
 
+    if options.rate > _FASTEST:
+        raise AnytimeError(f"rate is {options.rate:g}; the simulation keeps up with {_FASTEST:g}")
     if options.port > 65535:
         raise AnytimeError(f"port is {options.port}; it must be 0 (any) to 65535")
     file = Path(options.scene)

@@ -139,10 +139,15 @@ class Query:
         work clock no thread starts: whenever time passes there, the query makes the evaluations
         that its model's rate on the clock's machine allows, in whole generations, and keeps the
         rest for the next time. What a model raises is raised when the block ends.
-        Raises AnytimeError if the machine has no rate for the model.
+        Raises AnytimeError if the machine has no rate > 0 for the model.
         """
         if isinstance(clock, WorkClock):
             each = clock.machine.seconds(self.model.name, 1.0)
+            if not each > 0:
+                raise AnytimeError(
+                    f"{self.model.name!r} takes no time on machine {clock.machine.name!r}, so a "
+                    "search would never end; give it a rate > 0"
+                )
             with clock.beside(Share(self, each)):
                 yield self
             return

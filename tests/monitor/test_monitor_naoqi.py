@@ -301,6 +301,7 @@ def test_a_server_ends_on_ctrl_c(rig):
         (("--scene", "moon"), "no scene 'moon'; there are appearing"),
         (("--fault", "flood"), "no fault 'flood'"),
         (("--port", "70000"), "0 (any) to 65535"),
+        (("--rate", "1e9"), "rate is 1e+09; the simulation keeps up with 1000"),
     ],
 )
 def test_what_the_command_cannot_do_it_says_in_one_line(options, complaint, capsys):

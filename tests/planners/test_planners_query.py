@@ -246,6 +246,9 @@ def test_on_a_work_clock_the_search_gets_its_share_in_whole_generations():
     assert searched.evaluations == 1080
     with pytest.raises(AnytimeError, match="no rate"), searched.background(WorkClock(Machine("n"))):
         pass
+    timeless = WorkClock(Machine("n").with_rate("plan", 0.0))
+    with pytest.raises(AnytimeError, match="would never end"), searched.background(timeless):
+        pass
 
 
 @pytest.mark.parametrize("name", query.SWITCHES)
