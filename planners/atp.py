@@ -36,10 +36,10 @@ _FIRST_GRAIN = 2 * GRAIN  # … more of them while there is no way yet that coul
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
-_REGION_PERCENT = 104  # weight of the search over regions between ends 128 cells apart …
+_REGION_PERCENT = 112  # of the straight line: what search over regions expects over 128 cells …
 _PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
-_GUIDED_PERCENT = 102  # … and where landmarks tell it how far off the goal is
-_FIRST, _SCALES = 1.08, (1.015, 0.995)
+_TAXI = 1.2  # … and how many times as much without diagonals
+_FIRST, _SCALES = 1.08, (1.01, 0.995)
 """By what the norm of independent obstacles is multiplied, search by search …"""
 _TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
@@ -226,8 +226,8 @@ class _Query:
         distances = grid.landmarks.tables.far
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
-        if len(distances):
-            percent = _GUIDED_PERCENT
+        if not self.diagonals:
+            percent = round(_TAXI * percent)
         try:
             work = region_search.begin_regions(
                 *soft, self.start, self.goal, percent, grid.regions, run, distances
