@@ -7,11 +7,13 @@ import inspect
 import random
 import threading
 import time
-from collections import Counter
+from bisect import bisect_right
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any, ParamSpec, TypeVar, cast
 
 from anytime.clocks import Clock, WallClock
@@ -21,8 +23,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Score = Callable[[Any], float]
 FRAMES = 1000  # that are kept, drawn evenly from all
-RESULTS = 64  # of one call that are kept, at most
-ATOMS = (bool, int, str, bytes, type(None))  # whose identity says nothing of where they come from
+RESULTS = 64  # of one call whose times are kept, and whose way to others is known, at most
+ATOMS = (bool, int, str, bytes, Enum, type(None))  # whose identity says nothing of who made them
 
 
 @dataclass(frozen=True)
@@ -48,23 +50,34 @@ class Watched:
 class Seen:
     """One call: seconds within it at each result, scores, what fed it, and whether it returned.
 
+    numbers: which of its results these are: all, or every second, fourth … of many, and the last.
     fed: parameter → (function, which of its results). given: `seconds`, if it was told its time.
     """
 
     seconds: list[float] = field(default_factory=list[float])
     scores: list[float] = field(default_factory=list[float])
+    numbers: list[int] = field(default_factory=list[int])
     fed: dict[str, tuple[str, int]] = field(default_factory=dict[str, tuple[str, int]])
     end: float = 0.0
     complete: bool = False
     given: float | None = None
 
+    def kept(self, number: int) -> int:
+        """The place of a result, or of the last one kept before it."""
+        return max(bisect_right(self.numbers, number) - 1, 0)
+
 
 @dataclass
 class Frame:
-    """The calls of one turn of the loop, by function, in the order in which they began."""
+    """The calls of one turn of the loop, by function, in the order in which they began.
+
+    made: their latest results, by function, with the number of each.
+    """
 
     calls: dict[str, Seen] = field(default_factory=dict[str, Seen])
-    made: list[tuple[Any, str, int]] = field(default_factory=list[tuple[Any, str, int]])
+    made: dict[str, deque[tuple[Any, int]]] = field(
+        default_factory=dict[str, "deque[tuple[Any, int]]"]
+    )
 
 
 class Shadow:
@@ -96,7 +109,13 @@ class Shadow:
         self._call: ContextVar[_Watch | None] = ContextVar("call", default=None)
 
     def frame(self, function: Callable[P, R]) -> Callable[P, R]:
-        """The same function, each call of which is one turn of the loop."""
+        """The same function, each call of which is one turn of the loop.
+
+        Raises AnytimeError for what is not a plain function: a call of another returns before its
+        turn is over.
+        """
+        if _is_async(function) or inspect.isgeneratorfunction(function):
+            raise AnytimeError(f"cannot watch {function!r} as a frame; give a plain function")
 
         @functools.wraps(function)
         def turn(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -121,13 +140,16 @@ class Shadow:
         that is watched already.
         """
         name = getattr(function, "__name__", "")
-        if not callable(function) or inspect.iscoroutinefunction(function) or not name:
+        if not callable(function) or _is_async(function) or not name:
             raise AnytimeError(f"cannot watch {function!r}; give a function or generator function")
         if name in self.watched:
             raise AnytimeError(f"{name!r} is watched already; names must differ")
         if quality and cost:
             raise AnytimeError(f"{name!r}: give quality=… or cost=…, not both")
-        known = inspect.signature(function)
+        try:
+            known = inspect.signature(function)
+        except ValueError:
+            raise AnytimeError(f"cannot watch {name!r}: it tells no parameters; wrap it") from None
         many = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
         kinds = {each: parameter.kind for each, parameter in known.parameters.items()}
         names = tuple(n for n, kind in kinds.items() if kind not in many and n != "seconds")
@@ -210,12 +232,21 @@ class Shadow:
         return _Watch(self, self._call, watched, frame, seen)
 
 
+def _is_async(function: Callable[..., Any]) -> bool:
+    return inspect.iscoroutinefunction(function) or inspect.isasyncgenfunction(function)
+
+
 def _maker(frame: Frame, value: Any) -> tuple[str, int] | None:
     """Which result of this frame a value is: the last that is the very same object."""
-    if isinstance(value, ATOMS):
+    if isinstance(value, ATOMS) or value == ():
         return None
-    found = (source for made, *source in reversed(frame.made) if made is value)
-    return cast("tuple[str, int] | None", next(map(tuple, found), None))
+    found = (
+        (name, number)
+        for name, results in reversed(frame.made.items())
+        for made, number in reversed(results)
+        if made is value
+    )
+    return next(found, None)
 
 
 class _Watch:
@@ -233,6 +264,7 @@ class _Watch:
         self._watched, self._frame, self._seen = watched, frame, seen
         self._spent = 0.0  # before it was entered this time
         self._entered = 0.0
+        self._results, self._stride = 0, 1
 
     def enter(self) -> Any:
         token = self._current.set(self)
@@ -261,13 +293,20 @@ class _Watch:
         if not fits:
             self._shadow.odd[f"{self._watched.name} with a score that is none"] += 1
             return
-        if len(seen.seconds) >= RESULTS:  # the last one is the result
-            del seen.seconds[-1], seen.scores[-1]
+        number, name = self._results, self._watched.name
+        self._results += 1
+        if seen.numbers and seen.numbers[-1] % self._stride:  # it was kept as the last
+            del seen.seconds[-1], seen.scores[-1], seen.numbers[-1]
         seen.seconds.append(round(self._spent, 9))
         seen.scores.append(worth)
+        seen.numbers.append(number)
+        if len(seen.numbers) > RESULTS:
+            self._stride *= 2
+            for row in (seen.seconds, seen.scores, seen.numbers):
+                row[:] = [*row[:-1:2], row[-1]]
         parts: tuple[Any, ...] = cast("tuple[Any, ...]", value) if type(value) is tuple else ()
-        for made in (value, *parts):
-            self._frame.made.append((made, self._watched.name, len(seen.seconds) - 1))
+        made = self._frame.made.setdefault(name, deque(maxlen=RESULTS))
+        made.extend((part, number) for part in (value, *parts))
 
     def end(self, complete: bool) -> None:
         self._seen.end, self._seen.complete = round(self._spent, 9), complete

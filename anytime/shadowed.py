@@ -66,8 +66,10 @@ class Shadowed:
             seen, key = frame.calls[name], f"frame {number}"
             fed: dict[str, float] = {}
             for parameter in feeding:
-                source, index = seen.fed[parameter]
-                fed[parameter] = float(_qualities(self.watched[source], frame.calls[source])[index])
+                source, number = seen.fed[parameter]
+                made = frame.calls[source]
+                qualities = _qualities(self.watched[source], made)
+                fed[parameter] = float(qualities[made.kept(number)])
             runs.append(_recording(key, name, fed, seen, _qualities(self.watched[name], seen)))
             if cautious:
                 for parameter in feeding:
@@ -95,10 +97,14 @@ def shadowed(shadow: Shadow) -> Shadowed:
     if len(kept) < FEWEST:
         raise AnytimeError(
             f"only {len(kept)} of {len(frames)} frames have every call of {program!r} with a "
-            "result; watch functions that are called in every frame"
+            "result; watch functions that are called in every frame" + _oddities(shadow)
         )
     unknown = tuple(_unknown(shadow, program, frames, kept, usual))
     return Shadowed(program, kept, dict(shadow.watched), unknown)
+
+
+def _oddities(shadow: Shadow) -> str:
+    return "".join(f"\n  {what}: {count} times" for what, count in sorted(shadow.odd.items()))
 
 
 def _usual(frames: Sequence[Frame]) -> dict[str, dict[str, str]]:
@@ -122,11 +128,17 @@ def _program(shadow: Shadow, usual: Mapping[str, Mapping[str, str]]) -> Program:
     last = fed[-1] if fed else [*usual][-1]
     made: dict[str, Call] = {}
 
-    def call(name: str) -> Call:
+    def call(name: str, *feeding: str) -> Call:
+        if name in feeding:
+            circle = " to ".join((*feeding[feeding.index(name) :], name))
+            raise AnytimeError(
+                f"in most frames results go from {circle}, backwards; a program has no such circle"
+            )
         if name not in made:
             watched = shadow.watched[name]
             arguments = [
-                call(usual[name][p]) if p in usual[name] else Input(p) for p in watched.parameters
+                call(usual[name][p], *feeding, name) if p in usual[name] else Input(p)
+                for p in watched.parameters
             ]
             made[name] = opened.call(_module(watched), tuple(arguments))  # pyright: ignore
         return made[name]

@@ -21,7 +21,7 @@ from planners.atp import GRAIN
 from planners.frontier import least_way, next_base, path_to, pop, sift_up, way_cost
 from planners.grids import Grid, endpoints
 from planners.multipath import NO_WAY, Step, way_plan
-from planners.path_finding import Cell
+from planners.path_finding import Cell, percent_of
 from planners.problems import known_floors, walked_quality
 from planners.search import DIAGONAL, OUT_OF_BUDGET, SPAN, STRAIGHT
 
@@ -54,11 +54,14 @@ def steps(
     """Plan from start to goal: a way at most `weights[0]` times the cheapest, then shorter ones.
 
     As `planners.steps`: work is counted in expansions, and plans are ways from cell to cell, whose
-    `estimate` is the bound that their weight, or the least f that is open, proves.
-    Raises AnytimeError for weights that do not fall to 1 or more, and as `planners.steps`.
+    `estimate` is the bound that their weight, or the least f that is open, proves. Weights count in
+    whole per cent.
+    Raises AnytimeError for weights that do not fall from 100 at most to 1 or more, and as
+    `planners.steps`.
     """
-    if not weights or sorted(weights, reverse=True) != list(weights) or weights[-1] < 1.0:
-        raise AnytimeError(f"weights are {tuple(weights)}: they must fall and be at least 1")
+    percents = [percent_of(weight) for weight in weights]
+    if not percents or sorted(percents, reverse=True) != percents:
+        raise AnytimeError(f"weights are {tuple(weights)}: there must be one, and they must fall")
     grid = domain if isinstance(domain, Grid) else Grid(domain)
     first, last, diagonals = endpoints(grid, start, goal, connectivity)
     columns, cells = grid.shape[1], grid.cost.size
@@ -75,9 +78,8 @@ def steps(
         state=np.zeros(4, np.int64),
     )
     down, across = last // columns - first // columns, last % columns - first % columns
-    least, known = int(least_way(down, across, diagonals)), float(SPAN)
-    for iteration, weight in enumerate(weights):
-        percent = round(100 * weight)
+    least, known, changes = int(least_way(down, across, diagonals)), float(SPAN), grid.changes
+    for iteration, percent in enumerate(percents):
         lowest = _begin(columns, first, last, diagonals, percent, iteration, run)
         least = max(least, int(min(lowest, known)))
         found = OUT_OF_BUDGET
@@ -87,7 +89,7 @@ def steps(
             )
             cost, plan = float(run.state[_UPPER]), None
             if found != OUT_OF_BUDGET and cost < SPAN:
-                least = max(least, math.ceil(cost / weight))
+                least = max(least, math.ceil(100 * cost / percent))
             if cost < known:
                 way = path_to(grid.cost, grid.wall, columns, first, last, diagonals, run)
                 # Labels that were corrected late may have made it cheaper than the goal's says.
@@ -95,6 +97,7 @@ def steps(
                 run.state[_UPPER] = int(known)
                 plan = way_plan(way, columns, known, least)
             yield Step(float(taken), plan)
+            grid.unchanged(since=changes)
     if known == SPAN:
         yield Step(0.0, NO_WAY)
 

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
-from anytime.errors import AnytimeError
 from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
@@ -76,8 +75,7 @@ def steps(
                 plan, proven = query.plan(), query.done
                 best = query.cost
             yield Step(work, plan)
-            if grid.changes != changes:
-                raise AnytimeError("the map has changed while a plan was made; plan anew")
+            grid.unchanged(since=changes)
         if math.isinf(best):
             yield Step(0.0, NO_WAY)
     finally:

@@ -43,11 +43,6 @@ class Grid:
     """
 
     def __init__(self, domain: NDArray[np.floating]) -> None:
-        if getattr(domain, "dtype", None) == np.bool_:
-            raise AnytimeError(
-                "the domain is bool, it must be probabilities of being blocked; "
-                "`Grid.known(free)` takes a map of free cells"
-            )
         domain = _floats(domain)
         if domain.ndim != 2 or not domain.size:
             raise AnytimeError(f"the domain is {list(domain.shape)}, it must be [rows, columns]")
@@ -125,6 +120,11 @@ class Grid:
         self.__dict__.pop("landmarks", None)
         self.changes += 1
 
+    def unchanged(self, *, since: int) -> None:
+        """Raise AnytimeError if there was an update since so many `changes`."""
+        if self.changes != since:
+            raise AnytimeError("the map has changed while a plan was made; plan anew")
+
     def __repr__(self) -> str:
         seen = int((self.regions.count != 255).sum())
         return (
@@ -134,6 +134,11 @@ class Grid:
 
 
 def _floats(domain: object) -> NDArray[np.float32]:
+    if getattr(domain, "dtype", None) == np.bool_:
+        raise AnytimeError(
+            "the domain is bool, it must be probabilities of being blocked: (~free).astype(float); "
+            "`Grid.known(free)` takes a whole map of free cells"
+        )
     try:
         return np.ascontiguousarray(domain, np.float32)
     except (TypeError, ValueError):

@@ -107,6 +107,8 @@ def refinements(
     distance = max(abs(start[0] - goal[0]), abs(start[1] - goal[1]))
     level = _level(distance) if highest_level is None else highest_level
     grain = max(_LEAST_GRAIN, distance // 2) if grain is None else grain
+    if grain < 1:
+        raise AnytimeError(f"grain is {grain}, it must be at least 1 expansion")
     if not 0 <= level <= 15:
         raise AnytimeError(f"highest_level is {level}, it must be between 0 and 15")
     pyramid, streamed = _pyramid(domain, level)

@@ -136,6 +136,16 @@ def _query(
     return cells, ends[0], ends[1]
 
 
+def percent_of(weight: float) -> int:
+    """A weight of the heuristic in whole per cent, never more: it is a promise.
+
+    Raises AnytimeError for what is no number between 1 and 100.
+    """
+    if not is_number(weight) or not 1.0 <= weight <= 100.0:
+        raise AnytimeError(f"weight is {weight!r}, it must be a number between 1 and 100")
+    return math.floor(100 * weight + 1e-6)  # 1.15 is a little less in binary
+
+
 def _soft(
     grid: NDArray[np.uint8],
     wall: int,
@@ -145,9 +155,7 @@ def _soft(
     weight: float,
     connectivity: int,
 ) -> Path | None:
-    if not is_number(weight) or not 1.0 <= weight <= 100.0:
-        raise AnytimeError(f"weight is {weight!r}, it must be between 1 and 100")
-    work, diagonals, percent = workspace(grid.size), connectivity == 8, round(100 * weight)
+    work, diagonals, percent = workspace(grid.size), connectivity == 8, percent_of(weight)
     row, column = divmod(last, columns)
     target, box = (row, column, row + 1, column + 1), (0, 0, grid.size // columns, columns)
     found, expansions = window_search(

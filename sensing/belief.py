@@ -71,7 +71,7 @@ class Belief:
         walked = np.atleast_2d(np.asarray(cells, dtype=np.int64))
         if len(walked) == 1:
             row, column = (int(at) for at in walked[0])
-            near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
+            near = tuple(slice(max(at - 1, 0), max(at + 2, 0)) for at in (row, column))
             self.touched[near] = True
             self.log_odds[near] = np.where(free[near], np.float32(-CERTAIN), np.float32(CERTAIN))
             return

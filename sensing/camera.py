@@ -25,6 +25,7 @@ cv2.setNumThreads(1)  # a robot's other modules need the cores, and a mission mu
 _TILE = 512  # pixels a side of the tiles of noise and texture
 _SHADES = 255
 _OUTLIER = 3  # a pixel that differs from its neighbourhood by more standard deviations is defect
+_ROOM = 1.8  # deviations of noise from either shade to black or white, at least
 _MOST_EXPOSURES = 256  # 256 x 255 fits the uint16 accumulators
 
 
@@ -64,6 +65,13 @@ class Camera:
             )
         if not (0 <= self.noise <= _SHADES and 0 <= self.texture <= _SHADES):
             raise AnytimeError("noise and texture must be standard deviations from 0 to 255")
+        most = min(self.obstacle, _SHADES - self.floor) / _ROOM
+        if self.noise > most:
+            raise AnytimeError(
+                f"noise is {self.noise:g}: exposures would be cut off at black or white, and what"
+                f" is seen believed too much; for obstacle {self.obstacle} and floor {self.floor} it"
+                f" must be at most {most:.4g}"
+            )
         if not (0.0 <= self.defects <= 0.2 and 0.5 <= self.doubt < 1.0):
             raise AnytimeError("defects must be 0 to 0.2, and doubt a probability of 0.5 to 1")
 
@@ -74,7 +82,7 @@ class Camera:
         near = disc(center, radius, (free.shape[0], free.shape[1]))
         window = (near.row, near.column)
         scene = self.picture(free[near.window], window)
-        noise = _noise(self.noise)
+        noise = _noise(self.noise, 1 + -(-max(scene.shape) // _TILE))
         stuck = _stuck(scene.shape, self.defects, rng)
         sums = np.zeros((2, *scene.shape), np.uint16)  # of the odd and of the even exposures
         offsets = rng.integers(0, _TILE, (self.last, 2)).tolist()
@@ -181,10 +189,10 @@ def _blurred(image: NDArray[np.int16]) -> NDArray[np.int16]:
 
 
 @lru_cache(maxsize=4)
-def _noise(deviation: float) -> NDArray[np.int16]:
-    """A tile of sensor noise, repeated so that a view may begin anywhere in its first quarter."""
+def _noise(deviation: float, times: int) -> NDArray[np.int16]:
+    """A tile of sensor noise, so many times each way: a view may begin anywhere in the first."""
     tile = np.rint(np.random.default_rng(7).standard_normal((_TILE, _TILE)) * deviation)
-    noise = np.tile(tile.astype(np.int16), (2, 2))
+    noise = np.tile(tile.astype(np.int16), (times, times))
     noise.flags.writeable = False
     return noise
 

@@ -1,14 +1,21 @@
 """A shadow changes nothing and records what it saw."""
 
+import gc
 import inspect
 import threading
+import weakref
+from enum import Enum
+from operator import attrgetter
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from anytime import AnytimeError, Machine, WorkClock
-from anytime.shadow import FRAMES, Shadow
+from anytime.shadow import FRAMES, RESULTS, Shadow
 from anytime.shadowed import shadowed
+
+Mode = Enum("Mode", "ON OFF")
 
 
 @pytest.fixture
@@ -111,6 +118,104 @@ def test_a_score_that_fails_or_is_none_goes_no_further(system):
     worse = system.shadow.watch(abs, quality=lambda value: value)
     assert system.shadow.frame(lambda: (bad(), worse(-7)))() == (7, 7)
     assert system.shadow.odd["abs with a score that is none"] == 1
+
+
+def test_of_many_results_all_times_are_covered_and_few_results_are_alive():
+    clock = WorkClock(Machine("here"))
+    shadow, alive = Shadow(clock), weakref.WeakSet()
+
+    class Result:
+        def __init__(self, quality):
+            self.quality = quality
+            alive.add(self)
+
+    def many():
+        for index in range(1000):
+            clock.advance(0.001)
+            yield Result(min(1.0, (index + 1) / 100))
+
+    def use(result):
+        return result
+
+    quality = attrgetter("quality")
+    watched_many, watched_use = (shadow.watch(each, quality=quality) for each in (many, use))
+    most = []
+
+    @shadow.frame
+    def turn():
+        last = None
+        for result in watched_many():
+            last = result
+            most.append(len(alive))
+        watched_use(last)
+
+    for _ in range(20):
+        turn()
+    gc.collect()
+    assert not alive
+    assert max(most) <= RESULTS + 2
+    seen = shadow.frames[0].calls["many"]
+    assert len(seen.seconds) <= RESULTS
+    assert seen.seconds[-1] == pytest.approx(1.0)
+    assert max(np.diff(seen.seconds)) < 0.04
+    assert next(t for t, q in zip(seen.seconds, seen.scores, strict=True) if q == 1.0) < 0.14
+    assert shadow.frames[0].calls["use"].fed == {"result": ("many", 999)}
+    assert shadowed(shadow).library(cautious=False)["use"].recordings[0].inputs == {"result": 1.0}
+
+
+def test_what_every_function_may_hold_feeds_nobody():
+    shadow = Shadow()
+    make = shadow.watch(lambda: (Mode.ON, ()), quality=lambda _: 1.0)
+
+    def drive(mode, empty):
+        return mode
+
+    shadow.frame(lambda: (make(), shadow.watch(drive)(Mode.ON, ())))()
+    assert shadow.frames[0].calls["drive"].fed == {}
+
+
+def test_results_that_go_in_a_circle_make_no_program():
+    shadow = Shadow()
+
+    def pair(name):
+        def function(x=None):
+            return object()
+
+        function.__name__ = name
+        return shadow.watch(function)
+
+    a, b, c = pair("a"), pair("b"), pair("c")
+
+    @shadow.frame
+    def turn(one, two, three):
+        three(two(one()))
+
+    for _ in range(20):
+        for order in ((a, b, c), (b, c, a), (c, a, b)):
+            turn(*order)
+    with pytest.raises(AnytimeError, match="no such circle"):
+        shadowed(shadow)
+
+
+def test_frames_and_functions_that_cannot_be_watched_are_refused():
+    async def wait():
+        pass
+
+    async def come():
+        yield 1
+
+    def give():
+        yield 1
+
+    shadow = Shadow()
+    for function in (wait, come, give):
+        with pytest.raises(AnytimeError, match="give a plain function"):
+            shadow.frame(function)
+    for function in (wait, come):
+        with pytest.raises(AnytimeError, match="give a function or generator function"):
+            shadow.watch(function)
+    with pytest.raises(AnytimeError, match="it tells no parameters"):
+        shadow.watch(int)
 
 
 def test_threads_have_frames_of_their_own(system):

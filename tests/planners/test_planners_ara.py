@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import anytime
 from anytime.errors import AnytimeError
-from planners import Grid, ara, astar
+from planners import Grid, ara, astar, weighted_astar
 from sensing import clustered, maze, rooms, uniform
 
 KINDS = (
@@ -49,3 +49,35 @@ def test_it_is_an_anytime_module():
 def test_weights_must_fall():
     with pytest.raises(AnytimeError, match="must fall"):
         list(ara.steps(np.zeros((5, 5)), (0, 0), (4, 4), weights=(1.0, 2.0)))
+    for weight in (0.5, float("inf"), float("nan"), "a"):
+        with pytest.raises(AnytimeError, match="between 1 and 100"):
+            list(ara.steps(np.zeros((5, 5)), (0, 0), (4, 4), weights=(weight,)))
+
+
+@given(st.integers(0, 2**32), st.floats(1.0, 1.1))
+@settings(max_examples=60)
+def test_a_weight_is_a_promise_to_the_last_digit(seed, weight):
+    rng = np.random.default_rng(seed)
+    free = uniform((60, 75), 0.2, rng)
+    cells = np.argwhere(free)
+    start, goal = (tuple(cells[i].tolist()) for i in rng.integers(len(cells), size=2))
+    best = astar(free, start, goal, 4)
+    if best is None:
+        return
+    last = list(ara.steps(Grid.known(free), start, goal, weights=(weight,), connectivity=4))[-1]
+    assert last.plan is not None
+    assert last.plan.estimate <= best.length / max(last.plan.length, 1e-9) + 1e-9 or not best.length
+    quick = weighted_astar(free, start, goal, weight, 4)
+    assert quick is not None
+    assert quick.length <= weight * best.length + 1e-9
+
+
+def test_a_plan_on_a_map_that_has_changed_is_refused():
+    rng = np.random.default_rng(0)
+    grid = Grid.known(uniform(200, 0.2, rng))
+    start, goal = (tuple(map(int, np.argwhere(grid.cost.reshape(200, 200))[at])) for at in (0, -1))
+    planning = ara.steps(grid, start, goal)
+    next(planning)
+    grid.update(1, 1, rng.integers(0, 2, (190, 190)).astype(float))
+    with pytest.raises(AnytimeError, match="the map has changed while a plan was made; plan anew"):
+        next(planning)

@@ -241,6 +241,8 @@ def test_mistakes_are_named():
     with pytest.raises(AnytimeError, match="the domain is a str; give probabilities"):
         Grid("map")
     grid = Grid.known(np.ones((9, 9), bool))
+    with pytest.raises(AnytimeError, match="the domain is bool"):
+        grid.update(0, 0, np.ones((2, 2), bool))
     grid.update(0, 0, [[1.0, 0.0]])
     with pytest.raises(AnytimeError, match=r"the domain is \[3\], it must be \[height, width\]"):
         grid.update(0, 0, [0.0, 1.0, 0.0])

@@ -142,6 +142,8 @@ def test_mistakes_are_named():
         list(steps(domain, (1, 1), (8, 8)))
     with pytest.raises(AnytimeError, match="highest_level is 99"):
         list(steps(domain, (1, 1), (8, 8), highest_level=99))
+    with pytest.raises(AnytimeError, match="grain is -1"):
+        list(steps(domain, (1, 1), (8, 8), grain=-1))
 
 
 def fingerprint(size):

@@ -90,7 +90,7 @@ def test_what_is_touched_is_certain_whatever_is_seen():
     assert belief.probabilities()[0, 0] == 1.0
 
 
-@given(st.lists(st.tuples(st.integers(0, 39), st.integers(0, 49)), min_size=1, max_size=9))
+@given(st.lists(st.tuples(st.integers(-3, 42), st.integers(-3, 52)), min_size=1, max_size=9))
 def test_a_walk_touches_what_its_steps_touch(cells):
     free = floor()
     walked, stepped = Belief(free.shape), Belief(free.shape)

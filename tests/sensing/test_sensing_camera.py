@@ -131,6 +131,13 @@ def test_the_smallest_floor_can_be_looked_at():
     assert seen[-1].blocked.shape == (1, 1)
 
 
+def test_a_view_may_be_wider_than_the_tile_of_noise():
+    free = uniform(201, 0.2, np.random.default_rng(0))
+    seen = list(Camera(last=4).look(free, (100, 100), 100, np.random.default_rng(0)))
+    assert seen[-1] is not None
+    assert seen[-1].quality == pytest.approx(seen[-1].score(free).quality, abs=0.03)
+
+
 @pytest.mark.parametrize(
     ("numbers", "complaint"),
     [
@@ -139,6 +146,7 @@ def test_the_smallest_floor_can_be_looked_at():
         ({"first": 9, "last": 8}, "first <= last"),
         ({"last": 1000}, "256"),
         ({"noise": float("nan")}, "noise"),
+        ({"floor": 235, "obstacle": 211}, "at most 11.11"),
         ({"defects": 0.9}, "defects"),
         ({"doubt": 0.4}, "doubt"),
     ],
