@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import tempfile
@@ -11,6 +12,8 @@ from collections.abc import Sequence
 from anytime import plugins
 from anytime.command_line import Parser, as_json, told
 from anytime.errors import AnytimeError
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # for what is printed
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -39,9 +42,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        if not error.filename:
+        if not error.filename and error.errno not in NO_ROOM:
             return _bug(error)
-        place = error.filename2 or error.filename
+        place = error.filename2 or error.filename or "standard output"
         print(f"anytime: {place}: {error.strerror or error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

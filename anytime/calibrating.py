@@ -157,9 +157,9 @@ def _compared(program: Program, profile: Profile, outcomes: list[Outcome]) -> Ca
             f"no run of {profile.module!r} could be compared; its results take no time or no work"
         )
     middle, half = _interval(np.log(ratios))
-    low, high = math.exp(middle - half), math.exp(middle + half)
-    # Seconds add up, so what a run takes on average is the mean of the ratios, not of their logs.
-    return Calibrated(profile.module, float(np.mean(ratios)), low, high, tuple(ratios), changed)
+    # Their mean as factors: one run that the machine kept waiting is an outlier, not the rate.
+    ratio, low, high = (math.exp(middle + step) for step in (0.0, -half, half))
+    return Calibrated(profile.module, ratio, low, high, tuple(ratios), changed)
 
 
 def _apart(one: Recording, other: Recording) -> float:

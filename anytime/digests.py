@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 import io
 import pickle
+import sys
 from collections.abc import Iterable
+from types import FunctionType
 from typing import Any, cast
 
 import numpy as np
@@ -45,10 +47,22 @@ def _content(value: Any) -> bytes:
 
 
 class _Pickler(pickle.Pickler):
-    """Writes the sets within a value by what they hold: their order differs between processes."""
+    """Writes what pickle would write differently in another process: sets, whose order differs, by
+    what they hold; classes and functions of a script, whose module is `__main__` or named after its
+    file, by their own names."""
 
     def persistent_id(self, obj: Any) -> bytes | None:
-        return _content(obj) if type(obj) in (set, frozenset) else None
+        if type(obj) in (set, frozenset):
+            return _content(obj)
+        if isinstance(obj, type | FunctionType) and _is_script(obj.__module__):
+            return obj.__qualname__.encode()
+        return None
+
+
+def _is_script(module: str) -> bool:
+    """Whether a module is a file outside of any package."""
+    packaged = "." in module or hasattr(sys.modules.get(module), "__path__")
+    return not packaged and module not in sys.stdlib_module_names
 
 
 def _array(array: NDArray[Any]) -> bytes:

@@ -148,6 +148,8 @@ def read_json(path: Path) -> Any:
     """Parse strict JSON: no NaN, no infinity, no key twice. Raises AnytimeError with the path."""
     try:
         size = path.stat().st_size
+        if path.exists() and not path.is_file() and not path.is_dir():
+            raise AnytimeError(f"{path}: a pipe or a device, no file")
         if size > LARGEST:
             raise AnytimeError(f"{path}: {size} bytes; at most {LARGEST} are read")
         text = path.read_bytes().decode()

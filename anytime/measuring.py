@@ -102,7 +102,27 @@ def measure(
         campaign = _described(program, how)
         kept = nullcontext() if file is None else opened(file, campaign, anew=not resume)
         found = _campaign(program, named, how, executor or "serial", kept, progress, watch)
+    _tell(program, found)
     return _library(program, found, known)
+
+
+def _tell(program: Program, outcomes: Sequence[Outcome]) -> None:
+    """Warn of modules that raised after a result, and of those that nothing ever reached."""
+    for name in dict.fromkeys(call.module.name for call in program.calls):
+        faults = [outcome.faults[name] for outcome in outcomes if name in outcome.faults]
+        if faults:
+            warnings.warn(
+                f"{name} failed on {len(faults)} of {len(outcomes)} problems, with what it had by "
+                f"then as its result: {faults[0]}",
+                stacklevel=3,
+            )
+    for call in program.calls:
+        if not any(outcome.recordings[call.label] for outcome in outcomes):
+            warnings.warn(
+                f"{call.label} was not run: nothing reached it on {len(outcomes)} problems; give "
+                "more seconds",
+                stacklevel=3,
+            )
 
 
 def _one_by_one(

@@ -7,6 +7,7 @@ from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from anytime import journals
@@ -30,8 +31,9 @@ class Outcome:
     """What the runs of a program's calls on one problem came to.
 
     recordings: by call. references: of each module with a cost, the cheapest known result. paces:
-    by module. failed: why there is nothing, of a problem that is left out. fatal: whether that
-    ended its worker, so that it is not tried again unasked.
+    by module. faults: by module, what a run raised after a result. failed: why there is nothing, of
+    a problem that is left out. fatal: whether that ended its worker, so that it is not tried again
+    unasked.
     """
 
     problem: str
@@ -40,6 +42,7 @@ class Outcome:
     )
     references: Mapping[str, float] = field(default_factory=dict[str, float])
     paces: Mapping[str, tuple[Pace, ...]] = field(default_factory=dict[str, tuple[Pace, ...]])
+    faults: Mapping[str, str] = field(default_factory=dict[str, str])
     failed: str | None = None
     fatal: bool = False
 
@@ -75,6 +78,7 @@ class _Line(Stored):
     paces: dict[str, list[tuple[bool, list[tuple[float, float]]]]]
     failed: str | None
     fatal: bool = False
+    faults: dict[str, str] = msgspec.field(default_factory=dict[str, str])
 
 
 class Store:
@@ -113,6 +117,7 @@ def _line(outcome: Outcome) -> _Line:
         },
         failed=outcome.failed,
         fatal=outcome.fatal,
+        faults=dict(outcome.faults),
     )
 
 
@@ -141,7 +146,13 @@ def _outcome(stored: _Line) -> Outcome:
         for name, rows in stored.paces.items()
     }
     return Outcome(
-        stored.problem, recordings, stored.references, paces, stored.failed, stored.fatal
+        stored.problem,
+        recordings,
+        stored.references,
+        paces,
+        stored.faults,
+        stored.failed,
+        stored.fatal,
     )
 
 

@@ -40,6 +40,14 @@ def clipped(line: str) -> str:
     return line if len(line) <= COLUMNS else line[: COLUMNS - 1] + "…"
 
 
+def elided(name: str, width: int) -> str:
+    """A name in at most so many characters, without its middle: settings of a knob end it."""
+    if len(name) <= width:
+        return name
+    end = width // 2
+    return f"{name[: width - end - 1]}…{name[-end:]}"
+
+
 def duration(seconds: float) -> str:
     """A time in few characters: 79.6 ms, 1.20 s."""
     if math.isnan(seconds):

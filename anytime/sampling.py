@@ -79,7 +79,12 @@ def sampled(program: Program, key: str, problem: Any, how: How) -> Outcome:
     for call in program.calls:
         known = paces.get(call.module.name, ())
         paces[call.module.name] = known + tuple(map(_pace, samples[call.label]))
-    return Outcome(key, recordings, references, paces)
+    faults = {
+        sample.module.name: str(sample.result.fault)
+        for sample in itertools.chain(*samples.values())
+        if sample.result.fault
+    }
+    return Outcome(key, recordings, references, paces, faults)
 
 
 def _references(program: Program, samples: Mapping[str, list[_Sample]]) -> dict[str, float]:

@@ -303,7 +303,7 @@ class _Watch:
         if len(seen.numbers) > RESULTS:
             self._stride *= 2
             for row in (seen.seconds, seen.scores, seen.numbers):
-                row[:] = [*row[:-1:2], row[-1]]
+                del row[1:-1:2]
         parts: tuple[Any, ...] = cast("tuple[Any, ...]", value) if type(value) is tuple else ()
         made = self._frame.made.setdefault(name, deque(maxlen=RESULTS))
         made.extend((part, number) for part in (value, *parts))

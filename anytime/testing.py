@@ -58,8 +58,14 @@ def conforms(
     """Raise at the first of all checks that the module fails.
 
     problems: as `anytime.measure` takes them, three or more. seconds: of a run that is long enough
-    for the module to get somewhere. clock: makes the clock of a run.
+    for the module to get somewhere. clock: makes the clock of a run. Raises AnytimeError for a
+    module whose knobs are not set.
     """
+    if module.knobs:
+        one = ", ".join(f"{name}={each.values[0]!r}" for name, each in module.knobs.items())
+        raise AnytimeError(
+            f"{module.name} has knobs; check its settings one by one, as {module.name}.set({one})"
+        )
     for check in CHECKS:
         check(module, problems, seconds=seconds, clock=clock)
 

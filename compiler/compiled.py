@@ -379,7 +379,9 @@ def _check_inputs(program: Program, inputs: Mapping[str, Any]) -> None:
     missing = [name for name in program.inputs if name not in inputs]
     unknown = [name for name in inputs if name not in program.inputs]
     if missing or unknown:
-        wrong = f"misses {missing[0]!r}" if missing else f"does not take {unknown[0]!r}"
+        wrongs = [f"misses {name!r}" for name in missing[:1]]
+        wrongs += [f"does not take {name!r}" for name in unknown[:1]]
+        wrong = " and ".join(wrongs)
         raise AnytimeError(f"{program.name} {wrong}; its inputs are {', '.join(program.inputs)}")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
-from anytime.pictures import clipped, duration, figure, line_chart, number, sparkline
+from anytime.pictures import clipped, duration, elided, figure, line_chart, number, sparkline
 from anytime.programs import Program
 from compiler.calibrating import AS_IT_IS, Calibration
 from compiler.costs import stretched
@@ -62,18 +62,19 @@ class Explanation:
 
     def __repr__(self) -> str:
         low, high = self.within
+        width = min(max(16, *(len(price.label) for price in self.prices)), 24)
         lines = [
             f"{self.program} in {duration(self.seconds)}: promised {number(self.promised)}"
             f" [{number(low)}, {number(high)}]; "
             f"10 % less time {number(self.less)}, 10 % more {number(self.more)}",
-            f"  {'call':<16} {'gets':>9} {'':<16}  {duration(self.step):>8} more  a second"
+            f"  {'call':<{width}} {'gets':>9} {'':<16}  {duration(self.step):>8} more  a second"
             f"  shares {duration(self.budgets[0])} … {duration(self.budgets[-1])}",
         ]
         for price in self.prices:
             share = price.share / self.seconds if self.seconds > 0 else 0.0
             bar = "█" * round(16 * share)
             lines.append(
-                f"  {price.label:<16.16} {duration(price.share):>9} {bar:<16}  "
+                f"  {elided(price.label, width):<{width}} {duration(price.share):>9} {bar:<16}  "
                 f"{price.gain:>+13.4f}  {price.a_second:>+8.2f}  {sparkline(price.shares)}"
             )
         lines.append(self.decided or certificate(self.regret))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from anytime.pictures import COLUMNS, clipped, duration, line_chart, number
+from anytime.pictures import COLUMNS, clipped, duration, elided, line_chart, number
 from compiler import baselines
 from compiler.allocations import Allocation
 from compiler.explaining import certificate
@@ -22,9 +22,10 @@ def text_of(
     many calls the first ones."""
     labels = list(rows[0][0].shares)
     width = max(12, *(len(label) + 2 for label in labels))
+    width = max(12, min(width, ROOM // len(labels)))
     shown = len(labels) if len(labels) * width <= ROOM else max(1, (ROOM - MORE) // width)
     more = "" if shown == len(labels) else f"{'…':>{MORE}}"
-    header = "".join(f"{label:>{width}}" for label in labels[:shown])
+    header = "".join(f"{elided(label, width - 2):>{width}}" for label in labels[:shown])
     lines = [title, f"{'budget':>10}{header}{more}   promised  95 %"]
     for allocation, (low, high) in rows:
         seconds = [*allocation.shares.values()][:shown]

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from anytime.errors import AnytimeError
 from anytime.programs import makers
 from compiler import CompiledProgram
 from monitor.bodies import Robot
@@ -124,8 +125,12 @@ def _steady(
     endless = _patient(mission)
     lived: list[Lived] = []
     legs: list[tuple[Leg, ...]] = []
+    made: list[Robot] = []
     for seed in seeds:
         robot = make_robot()
+        if any(robot is other for other in made):
+            raise AnytimeError("make_robot gives the same robot again; let it make one each time")
+        made.append(robot)
         route = robot.situation().to_go
         report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
         if report and route > 0:
@@ -274,8 +279,8 @@ def _lived(sensing: float, route: float, report: Report) -> Lived:
     return Lived(
         sensing=sensing,
         route=route,
-        walked=sum(float(frame.story["length"]) for frame in moving),
-        planned=sum(float(frame.story["planned"]) for frame in moving),
+        walked=sum(frame.told("length") for frame in moving),
+        planned=sum(frame.told("planned") for frame in moving),
         moving=len(moving),
         standing=len(report.frames) - len(moving),
         estimate=float(np.mean(estimates)) if estimates else 0.0,

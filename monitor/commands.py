@@ -38,6 +38,9 @@ def replay(options: argparse.Namespace) -> Answer:
         finally:
             server.server_close()
         return Answer("")
+    for path in options.log:
+        if path.is_dir():
+            raise AnytimeError(f"{path} is a folder; give the log of a mission, a file")
     page = options.output or options.log[0].with_suffix(".html")
     if any(page.resolve() == path.resolve() for path in options.log):
         raise AnytimeError(f"{page} is the log itself; give another file with -o")

@@ -97,7 +97,7 @@ def legs_of(report: Report) -> tuple[Leg, ...]:
         Leg(
             frame.situation.to_go + frame.situation.in_hand,
             frame.situation.in_hand,
-            0.0 if frame.standing else float(frame.story["length"]),
+            0.0 if frame.standing else frame.told("length"),
             sum(call.elapsed for call in frame.calls),
             frame.standing,
         )

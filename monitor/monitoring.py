@@ -24,7 +24,7 @@ from monitor.missions import Mission
 from monitor.policies import Policy
 from monitor.reports import CallRecord, Frame, Moment, Report
 from monitor.rhythms import Rhythm
-from monitor.states import Decision, Situation, State
+from monitor.states import Decision, Situation, State, checked
 
 STILL = 100  # frames in a row in which no time passes, that end a mission
 NO_PLAN = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)  # what one raises
@@ -60,6 +60,8 @@ class Monitor:
         seed: of everything random in the modules, >= 0. listen: called with each frame when it is
         over. Raises AnytimeError for a negative seed, before anything moves.
         """
+        if isinstance(robot, type):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"the robot is the class {robot.__name__}; give one that it makes")
         if seed < 0:
             raise AnytimeError(f"seed is {seed}; it must be a whole number >= 0")
         with interruptible() as told, settled(isinstance(robot.clock, WallClock)):
@@ -108,7 +110,7 @@ class _Life:
             if self.told:
                 return Ending.ABORTED
             standing = not self.set_out(plan)
-            situation = self.robot.situation()
+            situation = checked(self.robot.situation())
             if situation.ending is Ending.REACHED:
                 self.robot.work(self.mission.job)
                 self.job = self.mission.job
@@ -149,9 +151,12 @@ class _Life:
         """The policy's decision; the one before, or the last resort, when it has none."""
         try:
             decision = self.monitor.decide(state)
-            if is_sound(decision):
+            missing = {*self.monitor.program.labels} - {*decision.shares}
+            if is_sound(decision) and not missing:
                 return decision
             reason = "its times or its speed are no finite numbers"
+            if missing:
+                reason = f"it gives no time to {min(missing)!r}"
         except Exception as error:
             reason = str(Fault.of(error))
         self.failures.note(f"the policy {self.monitor.name} failed: {reason}")
@@ -197,7 +202,7 @@ class _Life:
         if not last_frame:
             self.think(state, decision, moments, results, records)
         self.robot.complete()
-        after = self.robot.situation()
+        after = checked(self.robot.situation())
         interrupted = after.interrupted and not standing
         output = self.monitor.program.program.output
         known = known_of(output, results, self.inputs) if results else None

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from anytime.clocks import is_number
 from anytime.errors import AnytimeError
 from anytime.pictures import clipped, duration, sparkline
 from monitor.endings import Ending
@@ -71,6 +72,16 @@ class Frame:
     def waited(self) -> float:
         """Seconds in which the robot stood."""
         return self.ended - self.started - self.driven
+
+    def told(self, name: str) -> float:
+        """A number in the robot's story. Raises AnytimeError where it tells none by that name."""
+        value: Any = self.story.get(name)
+        if not is_number(value):
+            raise AnytimeError(
+                f"the robot's story says {name!r} is {value!r}; calibration needs the lengths "
+                "walked and planned, `length` and `planned`, as numbers"
+            )
+        return float(value)
 
 
 class Again(Protocol):

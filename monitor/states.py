@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from anytime.clocks import is_number
+from anytime.errors import AnytimeError
 from monitor.endings import Ending
 
 Moment = Literal["frame", "call"]
@@ -25,6 +28,20 @@ class Situation:
     in_hand: float
     interrupted: bool = False
     ending: Ending | None = None
+
+
+def checked(situation: Situation) -> Situation:
+    """What a robot reports of itself, if it can be.
+
+    Raises AnytimeError, which names what cannot: energy and lengths are numbers >= 0, and finite
+    but for the way to go.
+    """
+    for name in ("energy", "to_go", "in_hand"):
+        value = getattr(situation, name)
+        finite = is_number(value) and (name == "to_go" or value < math.inf)
+        if not finite or not value >= 0:
+            raise AnytimeError(f"the robot's situation says {name} = {value!r}, no number >= 0")
+    return situation
 
 
 @dataclass(frozen=True)

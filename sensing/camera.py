@@ -69,8 +69,8 @@ class Camera:
         if self.noise > most:
             raise AnytimeError(
                 f"noise is {self.noise:g}: exposures would be cut off at black or white, and what"
-                f" is seen believed too much; for obstacle {self.obstacle} and floor {self.floor} it"
-                f" must be at most {most:.4g}"
+                f" is seen believed too much; for obstacle {self.obstacle} and floor"
+                f" {self.floor} it must be at most {most:.4g}"
             )
         if not (0.0 <= self.defects <= 0.2 and 0.5 <= self.doubt < 1.0):
             raise AnytimeError("defects must be 0 to 0.2, and doubt a probability of 0.5 to 1")

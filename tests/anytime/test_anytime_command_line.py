@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +15,7 @@ from hypothesis import strategies as some
 from anytime import AnytimeError, commands
 from anytime.__main__ import main
 from anytime.command_line import folder, natural, resolve, target
+from anytime.library import read_profile
 
 
 @given(some.integers(0, 10**17))
@@ -129,3 +132,53 @@ def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys
     report = Path(told.split("report: ")[1].strip())
     assert "ZeroDivisionError: of ours" in report.read_text()
     report.unlink()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
+def test_a_full_device_is_one_line():
+    command = f"{sys.executable} -m anytime doctor --seconds 0.01 > /dev/full"
+    told = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert told.returncode == 2
+    assert told.stderr.strip() == "anytime: standard output: No space left on device"
+
+
+def test_modules_that_raise_after_a_result_or_that_nothing_reaches_are_told(tmp_path, capsys):
+    file = tmp_path / "faulty.py"
+    file.write_text(
+        "import anytime, compiler\n"
+        "from types import SimpleNamespace\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def guess(image):\n"
+        "    yield 0.1\n"
+        "    raise ValueError('a bug in every run')\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def slow(image):\n"
+        "    while not anytime.expired():\n"
+        "        pass\n"
+        "@anytime.module(quality=lambda x: x)\n"
+        "def use(found):\n"
+        "    yield 1.0\n"
+        "@compiler.program\n"
+        "def both(image):\n"
+        "    return use(slow(image))\n"
+        "def problems(rng): return [SimpleNamespace(image=index) for index in range(3)]\n"
+    )
+    asked = ["--problems", f"{file}:problems", "--seconds", "0.01", "--library"]
+    kept = tmp_path / "profiles"
+    assert main(["profile", f"{file}:guess", *asked, str(kept)]) == 0
+    told = capsys.readouterr().err
+    assert "guess failed on 3 of 3 problems, with what it had by then as its result" in told
+    assert "ValueError: a bug in every run" in told
+    main(["profile", f"{file}:both", *asked, str(tmp_path / "others")])
+    assert "use was not run: nothing reached it on 3 problems" in capsys.readouterr().err
+
+
+def test_a_profile_that_is_a_pipe_is_refused(tmp_path):
+    os.mkfifo(tmp_path / "see.profile")
+    with pytest.raises(AnytimeError, match="a pipe or a device, no file"):
+        read_profile(tmp_path / "see.profile")
+
+
+def test_the_page_of_a_folder_is_refused(capsys):
+    assert main(["replay", "."]) == 2
+    assert "is a folder; give the log of a mission" in capsys.readouterr().err

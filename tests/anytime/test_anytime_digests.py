@@ -31,6 +31,28 @@ def test_a_digest_is_the_same_in_a_process_that_hashes_otherwise():
         assert told.stdout.strip() == digest_of(Fraction, WORDS, room, {"b": 2, "a": 1})
 
 
+def test_a_value_of_a_script_has_the_same_digest_where_the_script_is_imported(tmp_path):
+    script = tmp_path / "cart.py"
+    script.write_text(
+        "from dataclasses import dataclass\n"
+        "from anytime.digests import digest_of\n"
+        "@dataclass\nclass Place:\n    at: float\n"
+        "def here(): return digest_of(Place(1.0), here)\n"
+        "if __name__ == '__main__': print(here())\n"
+    )
+    told = [
+        subprocess.run(
+            [sys.executable, *how],
+            env={"PYTHONPATH": ":".join([str(tmp_path), *sys.path])},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for how in ([str(script)], ["-c", "import cart; print(cart.here())"])
+    ]
+    assert told[0] == told[1]
+
+
 @pytest.mark.parametrize(
     ("one", "other"),
     [

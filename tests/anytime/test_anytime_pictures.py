@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anytime.pictures import BARS, duration, figure, line_chart, number, sparkline
+from anytime.pictures import BARS, duration, elided, figure, line_chart, number, sparkline
 
 finite = st.floats(-1e6, 1e6)
 
@@ -130,3 +130,8 @@ def test_a_figure_carries_its_text_for_those_who_cannot_see_it():
     html = figure("<svg></svg>", "a < b")
     assert html.startswith("<div><svg>")
     assert "a &lt; b" in html
+
+
+def test_a_long_name_loses_its_middle():
+    assert elided("look", 10) == "look"
+    assert elided("localize@particles=200", 12) == "local…es=200"

@@ -1,9 +1,11 @@
 """Missions in which things go wrong on purpose: none raises, each repeats from its number."""
 
+import math
 import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -94,6 +96,33 @@ def test_a_policy_that_fails_leaves_the_last_resort():
     report = Monitor(PROGRAM, Mad(), "mad").run(MISSION, robot)
     assert report.ending is Ending.REACHED
     assert "policy mad failed" in report.fault
+
+
+def test_a_policy_that_forgets_a_call_leaves_the_last_resort():
+    robot = GridRobot(floor(), MISSION.energy, WorkClock(REFERENCE))
+    report = Monitor(PROGRAM, constant({"look": 0.1}, 1.0), "short").run(MISSION, robot)
+    assert report.ending is Ending.REACHED
+    assert "the policy short failed: it gives no time to" in report.fault
+
+
+@pytest.mark.parametrize(
+    ("told", "wrong"), [({"energy": math.nan}, "energy = nan"), ({"to_go": -5.0}, "to_go = -5.0")]
+)
+def test_a_robot_that_tells_nonsense_of_itself_is_named(told, wrong, tmp_path):
+    class Confused(GridRobot):
+        def situation(self):
+            return replace(super().situation(), **told)
+
+    robot = Confused(floor(), MISSION.energy, WorkClock(REFERENCE))
+    report = Monitor(PROGRAM, STEADY, "c").run(MISSION, robot)
+    assert report.ending is Ending.INTERNAL
+    assert f"the robot's situation says {wrong}" in report.fault
+
+
+def test_a_class_is_no_robot():
+    monitor = Monitor(PROGRAM, STEADY, "c")
+    with pytest.raises(AnytimeError, match="the robot is the class GridRobot"):
+        monitor.run(MISSION, GridRobot)  # pyright: ignore[reportArgumentType]
 
 
 def test_a_suspended_process_is_noticed_on_the_clock():
