@@ -75,8 +75,9 @@ def new_region_run(rows: int, columns: int) -> RegionRun:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _as_crow_flies(rows, columns):
-    return int(np.sqrt(float(rows * rows + columns * columns)) * STRAIGHT)
+def _expected_way(rows, columns, scale):
+    """So much of the straight line, which is 1 a cell, as a cost."""
+    return int(np.sqrt(float(rows * rows + columns * columns)) * scale)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -110,8 +111,8 @@ def begin_regions(cost, wall, dearest, columns, start, goal, percent, regions, r
     state[OPENED], state[LAST_REGION], state[LOW], state[HIGH] = 0, last, 0, -1
     if first < 0 or last < 0:
         return work
-    h = _as_crow_flies(start // columns - goal // columns, start % columns - goal % columns)
-    h = h * percent // 100
+    down, along = start // columns - goal // columns, start % columns - goal % columns
+    h = _expected_way(down, along, STRAIGHT * percent / 100)
     # All that is open at once should fit into the ring of buckets: f falls on the way to the goal
     # by what the weight adds, rises by what landmarks leave to be desired, and with one step by at
     # most two blocks each way and back.
@@ -189,7 +190,10 @@ def search_regions(
     goal_row, goal_column = goal // columns, goal % columns
     per_block, per_across, per_column = 1.0 / count, 1.0 / across, 1.0 / columns
     waves = np.empty(SIDE * SIDE + 1, np.uint64)
-    guided = far.shape[0] > 0
+    # The regions beside the one at work that are not closed, at most one a cell of its border.
+    beside, joins = np.empty(4 * SIDE, np.int64), np.empty(4 * SIDE, np.int64)
+    sides = np.empty(4 * SIDE, np.int64)
+    guided, stale, scale = far.shape[0] > 0, base - SPAN, STRAIGHT * percent / 100
     while opened > 0:
         if work >= budget:
             found = OUT_OF_BUDGET
@@ -224,96 +228,89 @@ def search_regions(
             door_first, door_line, door_ahead, door_along = left, pin_row, bend_row, bend_column
         bend_g = pin_g - least_way(pin_row - bend_row, pin_column - bend_column, diagonals)
         inside, reached, mask = (pin_row - top) * SIDE + pin_column - left, np.int64(0), masks[here]
-        edges = np.int64(edge[here])
+        edges, ways = np.int64(edge[here]), 0
+        on_map = (block_row > 0, block_row + 1 < tall, block_column > 0, block_column + 1 < across)
         for side in range(4):
             mine = (edges >> (SIDE * side)) & 0xFF
-            if mine == 0:
+            if mine == 0 or not on_map[side]:
                 continue
-            # Ahead is across the border, along is on it.
-            ahead_is_row = side < 2
-            if ahead_is_row:
-                corner, first, at, most, apart = top, left, block_row, tall, across
-                pin_ahead, pin_along, bend_ahead = pin_row, pin_column, bend_row
-                bend_along, goal_ahead, goal_along = bend_column, goal_row, goal_column
-            else:
-                corner, first, at, most, apart = left, top, block_column, across, 1
-                pin_ahead, pin_along, bend_ahead = pin_column, pin_row, bend_column
-                bend_along, goal_ahead, goal_along = bend_row, goal_column, goal_row
-            if side & 1:
-                if at + 1 == most:
-                    continue
-                line, there = corner + SIDE, block + apart
-            else:
-                if at == 0:
-                    continue
-                line, there = corner - 1, block - apart
+            there = block + (-across, across, -1, 1)[side]
             if counts[there] == UNKNOWN:
                 work += part(cost, wall, dearest, columns, there, regions)
             for number in range(np.int64(counts[there])):
                 region = number * count + there
                 join = mine & (np.int64(edge[region]) >> (SIDE * (side ^ 1)))
-                if join == 0:
-                    continue
-                old = label[region]
-                known = old > base - SPAN
-                if known and old & 1:
-                    continue
-                place = crossing(bend_ahead, bend_along, goal_ahead, goal_along, line) - first
-                place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
-                from_ahead, from_along, from_g, from_cell = bend_ahead, bend_along, bend_g, bend
-                if bend != pin:
-                    to_ahead, to_along = line, first + place
-                    if upright != ahead_is_row:
-                        to_ahead, to_along = to_along, to_ahead
-                    if not _in_sight(
-                        door, door_first, door_line, door_ahead, door_along, to_ahead, to_along
-                    ):
-                        place = crossing(pin_ahead, pin_along, goal_ahead, goal_along, line) - first
-                        place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
-                        from_ahead, from_along, from_g, from_cell = pin_ahead, pin_along, pin_g, pin
-                along = first + place
-                g = from_g + least_way(line - from_ahead, along - from_along, diagonals)
-                start, stride = (0, 56, 0, 7)[side], 1 if side < 2 else SIDE
-                exit = start + place * stride
-                if reached == 0 and not is_clear(mask, inside, exit):
-                    reached = flood(mask, inside, diagonals, waves)
-                    work += reached * TOUCHED
-                if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
-                    # The way goes round something within the block, and may bend anywhere.
-                    least = SPAN
-                    for place in range(SIDE):
-                        if (join >> place) & 1 == 0:
-                            continue
-                        more = detour(waves, reached, inside, start + place * stride, diagonals)
-                        g = pin_g + STRAIGHT * more
-                        g += least_way(line - pin_ahead, first + place - pin_along, diagonals)
-                        h = least_way(line - goal_ahead, first + place - goal_along, diagonals)
-                        if g + h < least:
-                            least, along = g + h, first + place
-                    g = least - least_way(line - goal_ahead, along - goal_along, diagonals)
-                    from_cell = np.int64(NOTHING)
-                h = _as_crow_flies(line - goal_ahead, along - goal_along) * percent // 100
-                if guided:
-                    h = max(h, likely_way(far, region, last))
-                f = g + h
-                if known and f >= cheapest[region]:
-                    continue
-                label[region], cheapest[region] = base - g, f
-                cell = line * columns + along if ahead_is_row else along * columns + line
-                pins[region] = cell
-                bends[region] = cell if from_cell < 0 else from_cell
-                doors[region] = join | (side ^ 1) << SIDE
-                parents[region] = here
-                if unused >= 0:
-                    place, unused = unused, np.int64(behind[unused])
-                else:
-                    place = fresh
-                    fresh += 1
-                number = min(max(f >> shift, high - BUCKETS + 1), current + BUCKETS - 1)
-                entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
-                bucket[number & (BUCKETS - 1)] = place
-                opened += 1
-                current, low, high = min(current, number), min(low, number), max(high, number)
+                if join == 0 or (label[region] > stale and label[region] & 1):
+                    continue  # it is not beside, or closed
+                beside[ways], joins[ways], sides[ways] = region, join, side
+                ways += 1
+        for way in range(ways):
+            region, join, side = beside[way], joins[way], sides[way]
+            # Ahead is across the border, along is on it.
+            ahead_is_row = side < 2
+            line = (top - 1, top + SIDE, left - 1, left + SIDE)[side]
+            if ahead_is_row:
+                first, pin_ahead, pin_along, bend_ahead = left, pin_row, pin_column, bend_row
+                bend_along, goal_ahead, goal_along = bend_column, goal_row, goal_column
+            else:
+                first, pin_ahead, pin_along, bend_ahead = top, pin_column, pin_row, bend_column
+                bend_along, goal_ahead, goal_along = bend_row, goal_column, goal_row
+            place = crossing(bend_ahead, bend_along, goal_ahead, goal_along, line) - first
+            place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
+            from_ahead, from_along, from_g, from_cell = bend_ahead, bend_along, bend_g, bend
+            if bend != pin:
+                to_ahead, to_along = line, first + place
+                if upright != ahead_is_row:
+                    to_ahead, to_along = to_along, to_ahead
+                if not _in_sight(
+                    door, door_first, door_line, door_ahead, door_along, to_ahead, to_along
+                ):
+                    place = crossing(pin_ahead, pin_along, goal_ahead, goal_along, line) - first
+                    place = np.int64(NEAREST[join, min(max(place, 0), SIDE - 1)])
+                    from_ahead, from_along, from_g, from_cell = pin_ahead, pin_along, pin_g, pin
+            along = first + place
+            g = from_g + least_way(line - from_ahead, along - from_along, diagonals)
+            start, stride = (0, 56, 0, 7)[side], 1 if ahead_is_row else SIDE
+            exit = start + place * stride
+            if reached == 0 and not is_clear(mask, inside, exit):
+                reached = flood(mask, inside, diagonals, waves)
+                work += reached * TOUCHED
+            if reached > 0 and detour(waves, reached, inside, exit, diagonals) > 0:
+                # The way goes round something within the block, and may bend anywhere.
+                least = SPAN
+                for place in range(SIDE):
+                    if (join >> place) & 1 == 0:
+                        continue
+                    more = detour(waves, reached, inside, start + place * stride, diagonals)
+                    g = pin_g + STRAIGHT * more
+                    g += least_way(line - pin_ahead, first + place - pin_along, diagonals)
+                    h = least_way(line - goal_ahead, first + place - goal_along, diagonals)
+                    if g + h < least:
+                        least, along = g + h, first + place
+                g = least - least_way(line - goal_ahead, along - goal_along, diagonals)
+                from_cell = np.int64(NOTHING)
+            h = _expected_way(line - goal_ahead, along - goal_along, scale)
+            if guided:
+                h = max(h, likely_way(far, region, last))
+            f = g + h
+            if label[region] > stale and f >= cheapest[region]:
+                continue
+            label[region], cheapest[region] = base - g, f
+            cell = line * columns + along if ahead_is_row else along * columns + line
+            pins[region] = cell
+            bends[region] = cell if from_cell < 0 else from_cell
+            doors[region] = join | (side ^ 1) << SIDE
+            parents[region] = here
+            if unused >= 0:
+                place, unused = unused, np.int64(behind[unused])
+            else:
+                place = fresh
+                fresh += 1
+            number = min(max(f >> shift, high - BUCKETS + 1), current + BUCKETS - 1)
+            entry[place], behind[place] = region, bucket[number & (BUCKETS - 1)]
+            bucket[number & (BUCKETS - 1)] = place
+            opened += 1
+            current, low, high = min(current, number), min(low, number), max(high, number)
     state[CURRENT], state[OPENED] = current, opened
     state[LOW], state[HIGH], state[FRESH], state[UNUSED] = low, high, fresh, unused
     return found, work

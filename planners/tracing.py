@@ -13,7 +13,7 @@ from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost
 from planners.region_search import LAST_REGION, NEAREST
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "fc869f17f120"
+CALLED = "cc3afa5d7382"
 
 TAUT = 2
 """How often pins are drawn taut."""
@@ -116,6 +116,7 @@ def _draw_taut(columns, pins, bends, way, diagonals, regions):
             to_cell = min(max(after_row - top, 0), SIDE - 1) * SIDE
             to_cell += min(max(after_column - left, 0), SIDE - 1)
             came, went, least = np.int64(0), np.int64(0), SPAN
+            straight = least_way(after_row - before_row, after_column - before_column, diagonals)
             for along in range(SIDE):
                 bit = along * stride
                 if (join >> np.uint64(bit)) & ONE == ZERO:
@@ -140,6 +141,8 @@ def _draw_taut(columns, pins, bends, way, diagonals, regions):
                 if there < least:
                     least = there
                     pins[place] = row * columns + column
+                    if least == straight:
+                        break
     return touched
 
 
