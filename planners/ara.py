@@ -25,7 +25,7 @@ from planners.path_finding import Cell, percent_of
 from planners.problems import known_floors, walked_quality
 from planners.search import DIAGONAL, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "f700364c3c3c"
+CALLED = "d52e87379353"
 
 WEIGHTS = (3.0, 2.5, 2.0, 1.5, 1.4, 1.3, 1.2, 1.1, 1.05, 1.02, 1.0)
 """Weights of the heuristic, one after the other."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from planners.frontier import NOT_FIRST, NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "f700364c3c3c"
+CALLED = "d52e87379353"
 
 SIDE, MOST = 8, 32
 UNKNOWN = 255

@@ -169,34 +169,35 @@ def with_room(row, used, room):
 def path_to(cost, wall, columns, start, node, diagonals, work):
     """Read the path from `start` to `node` back from the labels of the last search."""
     rows, label = cost.size // columns, work.label
-    path = np.empty(64, np.int32)
+    path = np.empty(512, np.int32)
     count, row, column = 0, node // columns, node % columns
     while True:
-        if count == path.size:
-            path = with_room(path, count, 2 * count)
-        path[count] = node
-        count += 1
-        if node == start:
-            return path[:count][::-1].copy()
-        # Every label is the length of a real way, so the best neighbour is closer by its step, but
-        # for the one by which labels of closed nodes are less.
-        best, best_label, best_dr, best_dc = node, label[node] - 2, 0, 0
-        for dr in range(-1, 2):
-            if row + dr < 0 or row + dr >= rows:
-                continue
-            for dc in range(-1, 2):
-                if column + dc < 0 or column + dc >= columns:
+        # A loop of its own: one in which the array is replaced counts references to it each time.
+        while count < path.size:
+            path[count] = node
+            count += 1
+            if node == start:
+                return path[:count][::-1].copy()
+            # Every label is the length of a real way, so the best neighbour is closer by its step,
+            # but for the one by which labels of closed nodes are less.
+            best, best_label, best_dr, best_dc = node, label[node] - 2, 0, 0
+            for dr in range(-1, 2):
+                if row + dr < 0 or row + dr >= rows:
                     continue
-                if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
-                    continue
-                there = node + dr * columns + dc
-                least = DIAGONAL if dr != 0 and dc != 0 else STRAIGHT
-                if label[there] - least <= best_label:
-                    continue
-                step = step_cost(cost, wall, columns, there, -dr, -dc)
-                if step > 0 and label[there] - step > best_label:
-                    best, best_label, best_dr, best_dc = there, label[there] - step, dr, dc
-        node, row, column = best, row + best_dr, column + best_dc
+                for dc in range(-1, 2):
+                    if column + dc < 0 or column + dc >= columns:
+                        continue
+                    if (dr == 0 and dc == 0) or (not diagonals and dr != 0 and dc != 0):
+                        continue
+                    there = node + dr * columns + dc
+                    least = DIAGONAL if dr != 0 and dc != 0 else STRAIGHT
+                    if label[there] - least <= best_label:
+                        continue
+                    step = step_cost(cost, wall, columns, there, -dr, -dc)
+                    if step > 0 and label[there] - step > best_label:
+                        best, best_label, best_dr, best_dc = there, label[there] - step, dr, dc
+            node, row, column = best, row + best_dr, column + best_dc
+        path = with_room(path, count, 2 * count)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -16,7 +16,7 @@ from planners.path_finding import Cell, flat_free, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "872315106e79"
+CALLED = "5e5b4e953834"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much

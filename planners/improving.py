@@ -28,7 +28,7 @@ from planners.search import (
     WALL,
 )
 
-CALLED = "f700364c3c3c"
+CALLED = "d52e87379353"
 
 DONE = 0
 BUCKETS = 1 << 13

@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "ff0f4f4e50df"
+CALLED = "c529a3bb7b09"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

@@ -108,7 +108,8 @@ def flat_free(free: NDArray[Any], name: str) -> NDArray[np.uint8]:
 def index_of(cell: Cell, shape: tuple[int, ...], name: str) -> int:
     """Return the flat index of a (row, column) cell of a map, or raise where it lies outside."""
     try:
-        row, column = (operator.index(place) for place in cell)
+        row, column = cell
+        row, column = operator.index(row), operator.index(column)
     except (TypeError, ValueError):
         raise AnytimeError(
             f"{name} is {cell!r}; a cell is two whole numbers, (row, column)"

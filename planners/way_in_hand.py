@@ -16,7 +16,7 @@ from planners.improving import (
     search,
 )
 
-CALLED = "eefc6de8b633"
+CALLED = "1bd60240246b"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
@@ -25,16 +25,16 @@ _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 def so_far(cost, wall, columns, start, diagonals, run):
     """The way as a search that has beaten it, and still goes on, has made it shorter so far: flat
     indices."""
-    count, node = run.state[COUNT], run.state[MEETING]
+    count, node, path = run.state[COUNT], run.state[MEETING], run.path
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
-    if count == 0 or node == run.path[count - 1]:
+    if count == 0 or node == path[count - 1]:
         return beginning
     rest = count - 1  # its last visit, should the way go in a circle
-    while run.path[rest] != node:
+    while path[rest] != node:
         rest -= 1
     way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
     for place in range(rest + 1, count):
-        way[beginning.size + place - rest - 1] = run.path[place]
+        way[beginning.size + place - rest - 1] = path[place]
     return way
 
 
@@ -44,41 +44,42 @@ def take_up(cost, wall, columns, start, diagonals, run):
 
     Returns the cost of the new way.
     """
-    node, count = run.state[MEETING], run.state[COUNT]
+    node, count, path = run.state[MEETING], run.state[COUNT], run.path
     rest = count - 1
     beginning = path_to(cost, wall, columns, start, node, diagonals, run)
     run.state[MEETING] = NOTHING
-    while rest > 0 and run.path[rest] != node:
+    while rest > 0 and path[rest] != node:
         rest -= 1
     _replace(run, 0, min(rest, count - 1), beginning)
-    return way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
+    return way_cost(cost, wall, columns, path, 0, run.state[COUNT] - 1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _replace(run, first, last, piece):
     """Put a piece in the place of the way's cells `first` to `last`."""
-    count = run.state[COUNT]
+    # Arrays are taken out of the tuple once: inside a loop that would count references.
+    count, path = run.state[COUNT], run.path
     grown = piece.size - (last - first + 1)
     if grown > 0:
         for place in range(count - 1, last, -1):
-            run.path[place + grown] = run.path[place]
+            path[place + grown] = path[place]
     elif grown < 0:
         for place in range(last + 1, count):
-            run.path[place + grown] = run.path[place]
+            path[place + grown] = path[place]
     for place in range(piece.size):
-        run.path[first + place] = piece[place]
+        path[first + place] = piece[place]
     run.state[COUNT] = count + grown
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def follow_way(cost, wall, columns, run):
     """Tell the search that has begun what the way in hand costs up to each of its cells."""
-    total, base = np.int64(0), run.state[BASE]
+    total, base, path, prefix = np.int64(0), run.state[BASE], run.path, run.prefix
     run.state[FOLLOWS] = 1
-    run.prefix[run.path[0]] = base
+    prefix[path[0]] = base
     for place in range(run.state[COUNT] - 1):
-        total += way_cost(cost, wall, columns, run.path, place, place + 1)
-        run.prefix[run.path[place + 1]] = base + total
+        total += way_cost(cost, wall, columns, path, place, place + 1)
+        prefix[path[place + 1]] = base + total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
