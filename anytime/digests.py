@@ -55,13 +55,14 @@ class _Pickler(pickle.Pickler):
         if type(obj) in (set, frozenset):
             return _content(obj)
         if isinstance(obj, type | FunctionType) and _is_script(obj.__module__):
-            return obj.__qualname__.encode()
+            # What is made within a function has no name of its own, and cannot be pickled.
+            return None if "<" in obj.__qualname__ else obj.__qualname__.encode()
         return None
 
 
-def _is_script(module: str) -> bool:
+def _is_script(module: str | None) -> bool:
     """Whether a module is a file outside of any package."""
-    packaged = "." in module or hasattr(sys.modules.get(module), "__path__")
+    packaged = module is None or "." in module or hasattr(sys.modules.get(module), "__path__")
     return not packaged and module not in sys.stdlib_module_names
 
 

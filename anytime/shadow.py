@@ -238,7 +238,7 @@ def _is_async(function: Callable[..., Any]) -> bool:
 
 def _maker(frame: Frame, value: Any) -> tuple[str, int] | None:
     """Which result of this frame a value is: the last that is the very same object."""
-    if isinstance(value, ATOMS) or value == ():
+    if isinstance(value, ATOMS) or (type(value) is tuple and not value):
         return None
     found = (
         (name, number)

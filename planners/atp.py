@@ -41,6 +41,7 @@ _TAXI = 1.2  # … and how many times as much without diagonals
 _FIRST, _SCALES = 1.08, (1.01, 0.995)
 """By what the norm of independent obstacles is multiplied, search by search …"""
 _TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
+_WIDE = 0.1  # and where it expands so much of the distance's square, the next finds no less to do
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
 _WINDOW_SHARE = 4  # … which together take at most so many times the work of the coarse way
 _PATIENCE = 12  # expansions per cell of distance after which a weight was too small
@@ -123,8 +124,14 @@ class _Query:
         if clustering < _CLUSTERED:
             yield from self.search(_FIRST, patience=_PATIENCE * far)
             for scale in _SCALES:
-                if not self.done and not math.isinf(self.cost):
-                    yield from self.search(scale)
+                if self.done or math.isinf(self.cost):
+                    break
+                spent = 0.0
+                for work in self.search(scale):
+                    spent += work
+                    yield work
+                if spent > _WIDE * far**2:
+                    break
             if self.done:
                 return
         else:

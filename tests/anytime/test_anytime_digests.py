@@ -85,3 +85,9 @@ def test_other_values_have_other_digests(one, other):
 def test_what_cannot_be_pickled_is_named():
     with pytest.raises(TypeError, match="function cannot be pickled"):
         digest_of(lambda: None)
+
+
+def test_functions_without_a_name_of_their_own_are_not_taken_for_each_other():
+    for nameless in (lambda: 1, lambda: 2):
+        with pytest.raises(TypeError, match="cannot be pickled"):
+            digest_of(nameless)

@@ -174,6 +174,18 @@ def test_what_every_function_may_hold_feeds_nobody():
     assert shadow.frames[0].calls["drive"].fed == {}
 
 
+def test_an_array_is_told_apart_by_what_it_is_and_not_by_what_it_holds():
+    shadow = Shadow()
+    make = shadow.watch(lambda: np.zeros(3))
+
+    def use(array, other):
+        return array.sum() + other.sum()
+
+    use = shadow.watch(use)
+    assert shadow.frame(lambda: use(make(), np.zeros(3)))() == 0.0
+    assert shadow.frames[0].calls["use"].fed == {"array": ("<lambda>", 0)}
+
+
 def test_results_that_go_in_a_circle_make_no_program():
     shadow = Shadow()
 
