@@ -235,15 +235,23 @@ def plot(options: argparse.Namespace) -> Answer:
         if place.is_dir() and not inside:
             raise AnytimeError(f"{place}: a folder with nothing to draw; drawn are {known}")
         files += inside if place.is_dir() else [place]
-    options.output.mkdir(parents=True, exist_ok=True)
+    targets: dict[Path, Path] = {}
     for file in files:
+        target = options.output / f"{file.name}.png"
+        if targets.get(target, file) != file:
+            raise AnytimeError(
+                f"{targets[target]} and {file} would both be drawn as {target}; "
+                "draw them into folders of their own"
+            )
+        targets[target] = file
+    options.output.mkdir(parents=True, exist_ok=True)
+    for target, file in targets.items():
         if not file.is_file():
             raise AnytimeError(f"{file}: no such file")
         kind = file.suffix.removeprefix(".")
         if kind not in drawers:
             what = f".{kind}" if kind else "a file without a suffix"
             raise AnytimeError(f"{file}: cannot draw {what}; drawn are {known}")
-        target = options.output / f"{file.name}.png"
         plugins.load(drawers[kind])(file, target)
         drawn.append(str(target))
     return Answer("\n".join(drawn), {"files": drawn})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 
 BARS = "▁▂▃▄▅▆▇█"
 # Okabe & Ito's colours, told apart by colour-blind eyes; every series is labelled as well.
@@ -23,6 +24,13 @@ def sparkline(values: Sequence[float], low: float = 0.0, high: float = 1.0) -> s
         share = min(max((value - low) / span, 0.0), 1.0)
         marks.append(BARS[min(int(share * len(BARS)), len(BARS) - 1)])
     return "".join(marks)
+
+
+def thinned(values: Sequence[float], most: int) -> Sequence[float]:
+    """All of the values, or as many as `most`, spread evenly over them."""
+    if len(values) <= most:
+        return values
+    return [values[place * len(values) // most] for place in range(most)]
 
 
 def number(value: float) -> str:
@@ -76,7 +84,8 @@ def line_chart(
     height: int = 260,
     y_range: tuple[float, float] = (0.0, 1.0),
 ) -> str:
-    """A chart as inline SVG. series: label -> (x [n], y [n]); bands: label -> (x, low, high)."""
+    """A chart as inline SVG. series: label -> (x [n], y [n]), a gap where y is NaN; bands: label ->
+    (x, low, high)."""
     bands = bands or {}
     xs = [x for line in series.values() for x in line[0]] or [0.0, 1.0]
     x_low, x_high = min(xs), max(xs)
@@ -85,6 +94,7 @@ def line_chart(
     left, right = 48, width - (16 if len(series) < 2 else 128)
     top, bottom = 22 if title else 10, height - 34
     y_low, y_high = y_range
+    y_high = y_high if y_high > y_low else y_low + 1
 
     def place(x: float, y: float) -> str:
         across = left + (right - left) * (x - x_low) / (x_high - x_low)
@@ -111,17 +121,21 @@ def line_chart(
         colour = COLOURS[list(series).index(label) if label in series else index % len(COLOURS)]
         parts.append(f'<polygon points="{" ".join(edge)}" fill="{colour}" opacity="0.18"/>')
     for index, (label, (x, y)) in enumerate(series.items()):
-        points = " ".join(place(a, b) for a, b in zip(x, y, strict=True) if not math.isnan(b))
         colour = COLOURS[index % len(COLOURS)]
         dash = ' stroke-dasharray="5 4"' if label in dashed else ""
+        pieces = groupby(zip(x, y, strict=True), lambda point: not math.isnan(point[1]))
+        line = "".join(
+            "M" + "L".join(place(*at) for at in piece) for known, piece in pieces if known
+        )
         parts.append(
-            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.8"{dash}/>'
+            f'<path class="line" d="{line}" fill="none" stroke="{colour}" '
+            f'stroke-width="1.8"{dash}/>'
         )
         if len(series) > 1:
             legend = top + 14 + 14 * index
             parts.append(
                 f'<path d="M{right + 8},{legend - 4}h18" stroke="{colour}" stroke-width="2"{dash}/>'
-                f'<text x="{right + 30}" y="{legend}">{html.escape(label[:16])}</text>'
+                f'<text x="{right + 30}" y="{legend}">{html.escape(elided(label, 16))}</text>'
             )
     middle = (left + right) / 2
     parts.append(

@@ -44,6 +44,6 @@ def draw_schedule(source: Path, target: Path) -> None:
         )
         bottom += shares[:, index]
     below.set(xlabel="budget [s]", ylabel="share of the budget", ylim=(0, 1))
-    below.legend(frameon=False)
+    below.legend(framealpha=0.9)  # it lies on the areas
     figure.savefig(target, dpi=150, bbox_inches="tight")
     plt.close(figure)

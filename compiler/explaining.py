@@ -62,7 +62,7 @@ class Explanation:
 
     def __repr__(self) -> str:
         low, high = self.within
-        width = min(max(16, *(len(price.label) for price in self.prices)), 24)
+        width = min(max(16, *(len(price.label) for price in self.prices)), 20)
         lines = [
             f"{self.program} in {duration(self.seconds)}: promised {number(self.promised)}"
             f" [{number(low)}, {number(high)}]; "

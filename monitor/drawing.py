@@ -23,9 +23,10 @@ def draw_log(source: Path, target: Path) -> None:
     )
     names = [*log.mission.labels, "drive"]
     hatches = ("", "//", "..", "xx")
+    least = 0.002 * (log.frames[-1].ended if log.frames else 1.0)  # seconds, so wide as to be seen
     for row, name in enumerate(names):
         spans = [
-            (call.started, call.elapsed)
+            (call.started, max(call.elapsed, least))
             for frame in log.frames
             for call in frame.calls
             if call.label == name
@@ -38,6 +39,7 @@ def draw_log(source: Path, target: Path) -> None:
             facecolor=COLOURS[row % len(COLOURS)],
             hatch=hatches[row % len(hatches)],
             edgecolor="white",
+            linewidth=0,  # white edges would hide short bars
         )
     lanes.set_yticks(np.arange(len(names)), names)
     lanes.invert_yaxis()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -163,11 +164,21 @@ class MissionLine(_Line, frozen=True, tag_field="kind", tag="mission"):
 
     def worth(self, seconds: float) -> float:
         """The value of completing after so many seconds."""
-        value = self.value
         if self.news is not None and seconds >= float(self.news["at"]):
-            value = self.news
-        kind, worth, scale = (value[name] for name in ("kind", "worth", "seconds"))
-        return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
+            return _worth(self.news, seconds)
+        return _worth(self.value, seconds)
+
+    def told(self, begin: float, end: float) -> float:
+        """By how much the news changed that value, if they came after `begin` and until `end`."""
+        if self.news is None or not begin < float(self.news["at"]) <= end:
+            return 0.0
+        at = float(self.news["at"])
+        return _worth(self.news, at) - _worth(self.value, at)
+
+
+def _worth(value: Mapping[str, float | str], seconds: float) -> float:
+    kind, worth, scale = (value[name] for name in ("kind", "worth", "seconds"))
+    return float(Value(kind, float(worth), float(scale))(seconds))  # type: ignore[arg-type]
 
 
 class FrameLine(_Line, frozen=True, tag_field="kind", tag="frame"):

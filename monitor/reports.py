@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from anytime.clocks import is_number
 from anytime.errors import AnytimeError
-from anytime.pictures import clipped, duration, sparkline
+from anytime.pictures import clipped, duration, sparkline, thinned
 from monitor.endings import Ending
 from monitor.states import Decision, Situation
 
@@ -164,8 +164,8 @@ class Report:
         longest = max(contracts, default=1.0) or 1.0
         lines = [
             head,
-            f"  {len(self.frames)} frames, contract times {sparkline(contracts, 0, longest)}"
-            f" up to {duration(longest)}",
+            f"  {len(self.frames)} frames, contract times "
+            f"{sparkline(thinned(contracts, 50), 0, longest)} up to {duration(longest)}",
             f"  {ledger}",
         ]
         if self.fault:

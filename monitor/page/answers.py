@@ -9,7 +9,7 @@ import numpy as np
 
 from anytime.pictures import number
 from monitor.log_lines import CallLine, FrameLine, Log, MomentLine
-from monitor.page.losses import Loss, costliest, loss_of
+from monitor.page.losses import Loss
 
 # Seconds that "a little more thinking" can mean: the longest that the numbers reach.
 STEPS = (0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
@@ -30,7 +30,7 @@ def headline(log: Log, frame: FrameLine, moment: MomentLine) -> str:
         return f"{did}: {_step(step)} more would {_change(more)}."
     if less is not None:
         return f"{did}: there was no longer contract, and {_step(step)} less would {_change(less)}."
-    return f"{did}: the division is fixed, nothing was weighed."
+    return f"{did}: nothing else was weighed."
 
 
 def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
@@ -40,8 +40,7 @@ def why(log: Log, frame: FrameLine, moment: MomentLine) -> str:
         return f"0 calls were made: the plan in hand was enough{foreseen}."
     if moment.net is None or len(moment.curve) < 2:
         return (
-            f"The division is fixed: {_shares(moment.shares)} in every frame, "
-            f"{span(moment.contract)} in all; no other was weighed."
+            f"Nothing else was weighed: {_shares(moment.shares)}, {span(moment.contract)} in all."
         )
     known = [(at, net) for at, net in moment.curve if net is not None]
     peak, best = max(known, key=lambda point: point[1])
@@ -71,8 +70,8 @@ def fixed(log: Log, frame: FrameLine, moment: MomentLine, division: Mapping | No
         return f"This is the fixed division: {_shares(moment.shares)}; it made {number(net)}."
     if not division:
         return (
-            f"This log made {number(net)} and has no fixed division beside it; "
-            f"anytime run MISSION --policy fixed --seed {log.mission.seed} adds one."
+            f"This mission made {number(net)} and states no fixed division to set beside it: "
+            "[fixed] in its file, or a log of policy fixed on the same seed, would."
         )
     shares = division["shares"]
     contract = sum(shares.values())
@@ -96,9 +95,8 @@ def fixed(log: Log, frame: FrameLine, moment: MomentLine, division: Mapping | No
     return f"{sentence}. Over the mission it made {number(made)}, {number(abs(ahead))} {word}."
 
 
-def losses(log: Log) -> str:
-    """Where was most lost?"""
-    ranked = costliest(log)
+def losses(log: Log, ranked: Sequence[Loss]) -> str:
+    """Where was most lost? ranked: `costliest` of the log."""
     if not ranked:
         return "0 frames so far, so nothing is lost yet."
     worst = [loss for loss in ranked[:3] if loss.total > 0]
@@ -118,15 +116,18 @@ def losses(log: Log) -> str:
         f"Driving took {_amount(driven)} of the value, standing {_amount(waited)}, "
         f"energy {_amount(energy)}"
     )
+    news = sum(loss.news for loss in ranked)
+    if abs(news) >= 0.005:
+        parts.append(
+            f"What became known on the way {'took' if news > 0 else 'added'} {_amount(news)}"
+        )
     return ". ".join(parts) + "."
 
 
-def here_lost(log: Log, frame: FrameLine) -> str:
-    """What this frame lost."""
-    rank = [loss.index for loss in costliest(log)].index(frame.index) + 1
-    loss = _loss(loss_of(log, frame))
+def here_lost(frame: FrameLine, loss: Loss, rank: int, frames: int) -> str:
+    """What this frame lost, the `rank`-th costliest of so many."""
     broken = "; it was broken off" if frame.interrupted else ""
-    return f"This frame: {loss}{broken}. The {_ordinal(rank)}costliest of {len(log.frames)}."
+    return f"This frame: {_loss(loss)}{broken}. The {_ordinal(rank)}costliest of {frames}."
 
 
 def profile(log: Log) -> str:
@@ -138,7 +139,11 @@ def profile(log: Log) -> str:
     apart = np.array([seen - advertised for _, advertised, seen in pairs])
     outside = int((np.abs(apart) > BAND).sum())
     advertised, seen = (float(np.mean([pair[place] for pair in pairs])) for place in (1, 2))
-    doubt = 2.0 * float(apart.std()) / math.sqrt(len(pairs))
+    if len(pairs) < 2:
+        return (
+            f"One result says little: {number(advertised)} advertised, {number(seen)} seen in it."
+        )
+    doubt = 2.0 * float(apart.std(ddof=1)) / math.sqrt(len(pairs))
     verdict = "Yes, on the mean"
     if abs(apart.mean()) > max(doubt, 0.02):
         verdict = f"No, it promised too {'much' if seen < advertised else 'little'}"
@@ -222,7 +227,7 @@ def worth_at(moment: MomentLine, contract: float) -> float | None:
 def worth_of(moment: MomentLine) -> float:
     """What a decision was worth: its net value over that of the mean contract considered."""
     known = [net for _, net in moment.curve if net is not None]
-    return max(known) - float(np.mean(known)) if known else 0.0
+    return max(0.0, max(known) - float(np.mean(known))) if known else 0.0
 
 
 def compared(log: Log) -> list[tuple[int, float, float]]:

@@ -49,19 +49,22 @@ function drawShares() {
   const line = 34, height = names.length * line + 2, [svg, width] = picture("shares", height, "Shares of the contract");
   const shades = fills(svg, names);
   const left = Math.min(120, Math.max(64, 8 * Math.max(...names.map(name => name.length)) + 10));
-  const right = width - 118;
+  const told = name => {
+    const share = chosen.shares[name] || 0, call = now.calls.find(each => each.label === name);
+    return !now.calls.length ? "not called" : call ? `${duration(share)}, took ${duration(call.elapsed)}` : duration(share);
+  };
+  const right = width - 16 - 6.4 * Math.max(...names.map(name => told(name).length), 14);
   const longest = Math.max(1e-9, ...names.map(name => chosen.shares[name] || 0), ...now.calls.map(call => call.elapsed));
   names.forEach((name, index) => {
     const y = index * line + 5, share = chosen.shares[name] || 0, call = now.calls.find(each => each.label === name);
     const price = chosen.prices[name];
-    svg.append(text(0, y + 13, name, {class: "strong"}));
+    svg.append(named(0, y + 13, name, left - 8));
     svg.append(make("rect", {x: left, y, width: now.calls.length ? Math.max(1, (right - left) * share / longest) : 0, height: 16, fill: shades[name]}));
     if (call) {
       const used = left + (right - left) * call.elapsed / longest;
       svg.append(pressable(make("path", {d: `M${left} ${y + 20}H${used}M${used} ${y + 16.5}V${y + 23.5}`, stroke: call.overrun > 0 ? RED : INK, "stroke-width": 1.6}), call.text, () => {}));
     }
-    const taken = !now.calls.length ? "not called" : call ? `${duration(share)}, took ${duration(call.elapsed)}` : duration(share);
-    svg.append(text(width, y + 13, taken, {"text-anchor": "end"}));
+    svg.append(text(width, y + 13, told(name), {"text-anchor": "end"}));
     if (price !== undefined && price !== null) svg.append(text(width, y + 27, `${price >= 0 ? "+" : ""}${number(price)} a second`, {"text-anchor": "end"}));
   });
 }
@@ -82,7 +85,7 @@ function drawLanes() {
   svg.append(make("polyline", {points: seen.filter(one => !one.order).map(one => `${X(one.time)},${Y(one.net)}`).join(" "), fill: "none", stroke: "#0072b2", "stroke-width": 1.2, opacity: .7}));
   names.forEach((name, index) => {
     const y = tall + index * lane;
-    svg.append(make("path", {d: `M${gutter} ${y + lane - 4}H${width - 8}`, stroke: RULE}), text(0, y + 15, name, {class: "strong"}));
+    svg.append(make("path", {d: `M${gutter} ${y + lane - 4}H${width - 8}`, stroke: RULE}), named(0, y + 15, name, gutter - 6));
   });
   const bar = (name, from, to, label, index) => {
     if (to <= from) return;
@@ -110,6 +113,7 @@ function drawLanes() {
   for (const mark of marks) svg.append(text(X(mark), height - 6, mark.toFixed(digits), {"text-anchor": "middle"}));
   svg.append(text(0, height - 6, "seconds"));
 }
+const changed = by => Math.abs(by) < .005 ? "0" : `${by > 0 ? "+" : "−"}${number(Math.abs(by))}`;
 function drawWaterfall() {
   const steps = run().waterfall, line = 25;
   const height = steps.length * line, [svg, width] = picture("waterfall", height, "From the worth of the task to its net value");
@@ -122,8 +126,13 @@ function drawWaterfall() {
     svg.append(text(0, y + 16, names[step.name] || step.name, {class: "strong"}));
     svg.append(make("rect", {x: X(from), y: y + 4, width: Math.max(1, X(to) - X(from)), height: line - 9, fill: step.sum ? INK : shades[step.name] || RED}));
     if (index + 1 < steps.length) svg.append(make("path", {d: `M${X(step.after)} ${y + line - 5}v9`, stroke: SOFT}));
-    svg.append(text(width, y + 16, step.sum ? number(step.after) : step.before - step.after < .005 ? "0" : `−${number(step.before - step.after)}`, {"text-anchor": "end", class: step.sum ? "strong" : ""}));
+    svg.append(text(width, y + 16, step.sum ? number(step.after) : changed(step.after - step.before), {"text-anchor": "end", class: step.sum ? "strong" : ""}));
   });
+}
+function apart(frames, step) {  // of the first three, those whose labels touch none of a frame before them
+  const kept = [];
+  for (const index of frames.slice(0, 3)) if (kept.every(other => Math.abs(index - other) * step > 7 * String(index).length + 2)) kept.push(index);
+  return kept;
 }
 function drawFrames() {
   const it = run(), height = 112, [svg, width] = picture("frames", height, "Loss of each frame");
@@ -134,7 +143,7 @@ function drawFrames() {
   const rise = foreseen ? Math.max(0, ...falls.map(fall => -fall)) : 0, fall = Math.max(0, ...sizes), room = height - 36;
   const unit = room / (rise + fall || 1), most = fall || 1e-9;
   const bottom = foreseen ? top / 4 + rise * unit : height - 20;
-  const step = width / it.frames.length, worst = it.worst.slice(0, 3).filter(index => sizes[index] > 0);
+  const step = width / it.frames.length, worst = apart(it.worst.filter(index => sizes[index] > 0), step);
   const base = make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK});
   it.frames.forEach((each, index) => {
     let up = bottom;
@@ -176,13 +185,14 @@ function drawSeen() {
   for (const mark of marks) if (Number.isInteger(mark)) svg.append(text(X(mark), bottom + 16, mark, {"text-anchor": "middle"}));
 }
 function drawRivals() {
-  if (data.runs.length < 2) { $("rivals").replaceChildren(); return; }
-  const line = 27, [svg, width] = picture("rivals", data.runs.length * line + 4, "Net value of each policy");
-  const nets = data.runs.map(each => each.net ?? 0), low = Math.min(0, ...nets), high = Math.max(1e-9, ...nets), left = 82, right = width - 58;
+  const rivals = data.runs.filter(each => each.mission === run().mission && each.seed === run().seed);
+  if (rivals.length < 2) { $("rivals").replaceChildren(); return; }
+  const line = 27, [svg, width] = picture("rivals", rivals.length * line + 4, "Net value of each policy");
+  const nets = rivals.map(each => each.net ?? 0), low = Math.min(0, ...nets), high = Math.max(1e-9, ...nets), left = 82, right = width - 58;
   const X = value => left + (right - left) * (value - low) / (high - low || 1);
-  data.runs.forEach((each, index) => {
-    const y = index * line, net = each.net ?? 0, group = make("g");
-    group.append(text(0, y + 17, each.name, {class: index === tab ? "strong" : ""}),
+  rivals.forEach((each, order) => {
+    const index = data.runs.indexOf(each), y = order * line, net = each.net ?? 0, group = make("g");
+    group.append(named(0, y + 17, each.name, left - 6, {class: index === tab ? "strong" : ""}),
       make("rect", {x: X(Math.min(0, net)), y: y + 5, width: Math.max(1, Math.abs(X(net) - X(0))), height: line - 11, fill: index === tab ? INK : "#b9b3a6"}),
       text(width, y + 17, number(net), {"text-anchor": "end", class: index === tab ? "strong" : ""}));
     svg.append(pressable(group, `${each.name}: ${each.state}`, () => show(index)));
@@ -199,15 +209,15 @@ function drawRegret(it) {
   const height = 190, [svg, width] = picture("regret", height, "Regret of each frame");
   const top = 40, bottom = height - 32, step = width / it.frames.length, forked = it.frames.filter(each => each.forks);
   const most = Math.max(1e-9, ...forked.map(each => each.forks.regret));
-  const worst = [...forked].sort((a, b) => b.forks.regret - a.forks.regret).slice(0, 3).filter(each => each.forks.regret > 0);
+  const worst = apart([...forked].sort((a, b) => b.forks.regret - a.forks.regret).filter(each => each.forks.regret > 0).map(each => each.index), step);
   forked.forEach(each => {
     const index = each.index, regret = each.forks.regret, tall = (bottom - top) * regret / most, group = make("g");
     group.append(make("rect", {x: index * step, y: top - 20, width: step, height: bottom - top + 20, fill: index === at ? "#fbe9c6" : "transparent"}),
       make("rect", {x: index * step + step * .14, y: bottom - tall, width: Math.max(1, step * .72), height: tall, fill: RED}));
-    if (worst.includes(each)) group.append(text((index + .5) * step, bottom - tall - 4, index, {"text-anchor": "middle", class: "strong"}));
+    if (worst.includes(index)) group.append(text((index + .5) * step, bottom - tall - 4, index, {"text-anchor": "middle", class: "strong"}));
     svg.append(pressable(group, `frame ${index}: ${number(regret)} more by the best of ${each.forks.made.length} others`, () => go(index)));
   });
-  svg.append(make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK}), text(0, 11, `net value that the best other decision would have added, at most ${number(most > 1e-9 ? most : 0)}`), text(width, height - 2, "frame", {"text-anchor": "end"}));
+  svg.append(make("path", {d: `M0 ${bottom + .5}H${width}`, stroke: INK}), text(0, 11, `${width < 460 ? "added by the best other decision" : "net value that the best other decision would have added"}, at most ${number(most > 1e-9 ? most : 0)}`), text(width, height - 2, "frame", {"text-anchor": "end"}));
   for (const mark of ticks(0, it.frames.length - 1, 8)[0]) if (Number.isInteger(mark)) svg.append(text((mark + .5) * step, bottom + 15, mark, {"text-anchor": "middle"}));
 }
 function drawForks(it) {
@@ -226,7 +236,7 @@ function drawForks(it) {
     for (const one of points) svg.append(pressable(make("circle", {cx: X(one.at), cy: Y(one.net), r: one.net === best && best > it.net ? 5 : 3.4, fill: "#fff", stroke: one.net > it.net ? RED : INK, "stroke-width": one.net === best && best > it.net ? 2.4 : 1.2}), one.text, () => {}));
     svg.append(make("circle", {cx: X(own), cy: Y(it.net), r: 4.5, fill: INK}));
     const [marks, places] = ticks(least, most, 4);
-    for (const mark of marks) if (X(mark) < from + room - 4 || mark === marks[0]) svg.append(text(X(mark), bottom + 15, mark.toFixed(places), {"text-anchor": "middle"}));
+    for (const mark of marks) svg.append(text(X(mark), bottom + 15, mark.toFixed(places), {"text-anchor": "middle"}));
     svg.append(text(from + 8 + room, height - 2, name, {"text-anchor": "end"}));
   };
   const decided = now.moments[0], timed = forks.made.filter(one => one.timed);

@@ -10,6 +10,15 @@ function make(tag, attributes = {}, ...children) {
   return node;
 }
 const text = (x, y, content, more = {}) => make("text", {x, y, ...more}, String(content));
+function elided(name, room) {  // in so many pixels, without its middle: settings of a knob end it
+  const most = Math.max(3, Math.floor(room / 6.8)), end = most >> 1;
+  return name.length <= most ? name : `${name.slice(0, most - end - 1)}…${name.slice(-end)}`;
+}
+function named(x, y, name, room, more = {class: "strong"}) {
+  const shown = text(x, y, elided(name, room), more);
+  if (shown.textContent !== name) shown.append(make("title", {}, name));
+  return shown;
+}
 function picture(id, height, title) {
   const home = $(id), width = Math.max(240, home.clientWidth);
   const svg = make("svg", {viewBox: `0 0 ${width} ${height}`, height, role: "img", "aria-label": title});

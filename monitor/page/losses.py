@@ -12,20 +12,22 @@ class Loss:
     """What a frame took from the net value.
 
     drive, wait: value that ran out while the robot moved and stood. energy: price × energy used.
-    before, after: net value foreseen when it began and when the next one did (or the true one at
-    the end); None where nothing was foreseen.
+    news: value lost by what became known, negative where it was won. before, after: net value
+    foreseen when the frame began and when the next one did (or the true one at the end); None where
+    nothing was foreseen.
     """
 
     index: int
     drive: float
     wait: float
     energy: float
+    news: float = 0.0
     before: float | None = None
     after: float | None = None
 
     @property
     def used(self) -> float:
-        """What the frame used up, needful or not."""
+        """What the frame used up, needful or not; news are not its doing."""
         return self.drive + self.wait + self.energy
 
     @property
@@ -56,7 +58,8 @@ class Step:
 
 def loss_of(log: Log, frame: FrameLine) -> Loss:
     """The loss of one frame; the value that runs out is shared by the time moved and stood."""
-    late = log.mission.worth(frame.started) - log.mission.worth(frame.ended)
+    news = -log.mission.told(frame.started, frame.ended)
+    late = log.mission.worth(frame.started) - log.mission.worth(frame.ended) - news
     length = frame.ended - frame.started
     moved = min(max(frame.driven / length, 0.0), 1.0) if length > 0 else 0.0
     energy = log.mission.energy["price"] * frame.energy
@@ -65,7 +68,7 @@ def loss_of(log: Log, frame: FrameLine) -> Loss:
         after = log.frames[frame.index + 1].moments[0].net
     else:
         after = log.end.net if log.end else frame.so_far
-    return Loss(frame.index, late * moved, late * (1.0 - moved), energy, before, after)
+    return Loss(frame.index, late * moved, late * (1.0 - moved), energy, news, before, after)
 
 
 def waterfall(log: Log) -> list[Step]:
@@ -74,7 +77,8 @@ def waterfall(log: Log) -> list[Step]:
     steps: list[Step] = []
     left = worth = log.mission.worth(0.0)
     steps.append(Step("worth", 0.0, worth, sum=True))
-    for name in ("drive", "wait"):
+    told = any(loss.news for loss in losses)
+    for name in ("drive", "wait", "news") if told else ("drive", "wait"):
         lost = sum(getattr(loss, name) for loss in losses)
         steps.append(Step(name, left, left - lost))
         left -= lost

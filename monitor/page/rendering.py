@@ -14,7 +14,7 @@ from anytime.pictures import duration, number
 from monitor.log_lines import FrameLine, Log, MomentLine
 from monitor.logs import plain
 from monitor.page import answers, motion, regretted
-from monitor.page.losses import costliest, loss_of, waterfall
+from monitor.page.losses import Loss, costliest, waterfall
 
 _SCRIPTS = ("drawing.js", "map.js", "motion.js", "charts.js", "replay.js")
 
@@ -73,17 +73,30 @@ def write_page(
 def page_data(logs: Sequence[Log], names: Sequence[str] = ()) -> dict[str, Any]:
     """What the page draws, as plain data: numbers, and the sentences made of them."""
     runs = [_run(log, _fixed(log, logs)) for log in logs]
-    for run, name in zip(runs, names, strict=False):
+    for run, name in zip(runs, names or _names(logs), strict=True):
         run["name"] = name
     return plain({"band": answers.BAND, "runs": runs})
+
+
+def _names(logs: Sequence[Log]) -> list[str]:
+    """What tells missions apart: their policies, else with seeds, else with missions as well."""
+    lines = [log.mission for log in logs]
+    for named in (
+        [line.policy for line in lines],
+        [f"{line.policy}, seed {line.seed}" for line in lines],
+        [f"{line.name}, {line.policy}, seed {line.seed}" for line in lines],
+    ):
+        if len(set(named)) == len(named):
+            return named
+    return [f"{name} ({count})" for count, name in enumerate(named, 1)]
 
 
 def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
     mission, end = log.mission, log.end
     steps = waterfall(log)
-    ranked = [loss.index for loss in costliest(log)]
+    ranked = costliest(log)
+    place = {loss.index: (loss, rank) for rank, loss in enumerate(ranked, 1)}
     return {
-        "name": mission.policy,
         "mission": mission.name,
         "seed": mission.seed,
         "machine": mission.machine,
@@ -96,13 +109,13 @@ def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
         "unit": answers.speed_unit(log),
         "scene": _scene(log),
         "fixed": sum(division["shares"].values()) if division else None,
-        "frames": [_frame(log, frame, division) for frame in log.frames],
-        "worst": ranked,
+        "frames": [_frame(log, frame, *place[frame.index], division) for frame in log.frames],
+        "worst": [loss.index for loss in ranked],
         "waterfall": [
             {"name": step.name, "before": step.before, "after": step.after, "sum": step.sum}
             for step in steps
         ],
-        "losses": answers.losses(log),
+        "losses": answers.losses(log, ranked),
         "profile": answers.profile(log),
         "compared": answers.compared(log),
         "job": end.job if end else 0.0,
@@ -138,8 +151,9 @@ def _scene(log: Log) -> dict[str, Any] | None:
     }
 
 
-def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> dict[str, Any]:
-    loss = loss_of(log, frame)
+def _frame(
+    log: Log, frame: FrameLine, loss: Loss, rank: int, division: Mapping[str, Any] | None
+) -> dict[str, Any]:
     box = frame.belief
     return {
         "index": frame.index,
@@ -151,7 +165,7 @@ def _frame(log: Log, frame: FrameLine, division: Mapping[str, Any] | None) -> di
         "so_far": frame.so_far,
         "lost": [loss.drive, loss.wait, loss.energy],
         "fell": None if loss.before is None else loss.total,
-        "here_lost": answers.here_lost(log, frame),
+        "here_lost": answers.here_lost(frame, loss, rank, len(log.frames)),
         "here_seen": answers.here_seen(frame),
         "path": frame.path,
         "plan": frame.plan,

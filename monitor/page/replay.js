@@ -14,7 +14,13 @@ function draw() {
   head.textContent = it.mission;
   $("mission").replaceChildren(head, ` · ${it.name}, seed ${it.seed}${it.machine ? ` on machine ${it.machine}` : ""} · ${it.state}`);
   write("losses", it.losses); write("profile", it.profile);
-  if (!now) { write("sentence", "No frame is over yet: 0 decisions so far."); return; }
+  if (!now) {
+    write("sentence", it.ending ? "It ended before a frame was over: 0 decisions." : "No frame is over yet: 0 decisions so far.");
+    for (const id of ["where", "why", "fixed", "price", "here", "here-seen", "switching"]) write(id);
+    document.querySelectorAll(".chart").forEach(chart => chart.replaceChildren());
+    drawWaterfall(); drawRivals();
+    return;
+  }
   moment = Math.min(moment, now.moments.length - 1);
   const one = now.moments[moment];
   const again = now.moments.length > 1 ? ` · decision ${moment + 1} of ${now.moments.length}` : "";
@@ -28,15 +34,19 @@ function draw() {
 }
 function drawTabs() {
   if (data.runs.length < 2) return;
-  $("tabs").replaceChildren(...data.runs.map((each, index) => {
-    const button = document.createElement("button"), net = document.createElement("small");
-    net.textContent = number(each.net);
-    button.append(each.name, " ", net);
+  const tabs = $("tabs");
+  while (tabs.children.length < data.runs.length) {  // those that are there keep the focus
+    const button = document.createElement("button"), index = tabs.children.length;
     button.setAttribute("role", "tab");
-    button.setAttribute("aria-selected", index === tab);
     button.addEventListener("click", () => show(index));
-    return button;
-  }));
+    tabs.append(button);
+  }
+  data.runs.forEach((each, index) => {
+    const net = document.createElement("small");
+    net.textContent = number(each.net);
+    tabs.children[index].replaceChildren(each.name, " ", net);
+    tabs.children[index].setAttribute("aria-selected", index === tab);
+  });
 }
 function go(index, order = 0) {
   const count = run().frames.length;
@@ -63,8 +73,8 @@ function nextSwitch() {
   if (order.length) go(order.find(index => index > at) ?? order[0]);
 }
 function follow() {
-  const link = decodeURIComponent(location.hash.slice(1)).match(/^(?:(.*):)?(\d+)$/);
-  const named = link && link[1] ? data.runs.findIndex(each => each.name === link[1]) : 0;
+  const link = location.hash.slice(1).match(/^(?:(.*):)?(\d+)$/);
+  const named = link && link[1] ? data.runs.findIndex(each => encodeURIComponent(each.name) === link[1]) : 0;
   tab = Math.max(0, named);
   if (link && Number(link[2]) < run().frames.length) go(Number(link[2]));
   else show(tab);
@@ -81,10 +91,17 @@ let width = innerWidth;
 addEventListener("resize", () => { if (innerWidth !== width) { width = innerWidth; draw(); } });
 if (data.runs.length) follow();
 if (live) {
-  new EventSource("events").onmessage = async () => {
+  const events = new EventSource("events");
+  const told = document.title;
+  events.onerror = () => { document.title = `not followed: ${told}`; };  // until it is served again
+  events.onmessage = async () => {
+    const answer = await fetch("data");
+    if (!answer.ok) { events.onerror(); return; }
     const newest = at >= run().frames.length - 1;
-    data = await (await fetch("data")).json();
+    data = await answer.json();
+    document.title = told;
     belief = truth = null;
-    if (newest) go(run().frames.length - 1); else draw();
+    // Another mission may have begun in its place, and have fewer frames.
+    if (newest || at >= run().frames.length) go(run().frames.length - 1); else draw();
   };
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -279,10 +280,9 @@ def nao_sim(options: argparse.Namespace) -> Answer:
 def _wide(grid: GridMission) -> str:
     rows, columns = grid.scene.free.shape
     goals = ", ".join(map(str, grid.scene.goals))
-    return (
-        f"{grid.scene.name}, {rows} × {columns} cells, from {grid.scene.start} to "
-        f"{goals}, shortest way {grid.scene.optimal:.1f} cells"
-    )
+    optimal = grid.scene.optimal
+    way = f"shortest way {optimal:.1f} cells" if math.isfinite(optimal) else "no way leads there"
+    return f"{grid.scene.name}, {rows} × {columns} cells, from {grid.scene.start} to {goals}, {way}"
 
 
 def _ends(floor: Path | None, index: int) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -299,7 +299,7 @@ def _ends(floor: Path | None, index: int) -> tuple[tuple[int, int], tuple[int, i
 
 
 def _tolerated(text: str) -> float:
-    return 0.0 if text.strip() in ("0", "0.0") else positive(text)
+    return 0.0 if re.fullmatch(r"0*\.?0+|0+\.", text.strip()) else positive(text)
 
 
 def _cell(text: str) -> tuple[int, int]:

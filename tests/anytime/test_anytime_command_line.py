@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -119,6 +120,10 @@ def test_every_profile_of_a_folder_is_drawn(tmp_path, capsys):
     capsys.readouterr()
     assert main(["plot", str(kept), "-o", str(tmp_path)]) == 0
     assert capsys.readouterr().out.split() == [str(tmp_path / "guess.profile.png")]
+    other = tmp_path / "other"
+    shutil.copytree(kept, other)
+    assert main(["plot", str(kept), str(other), "-o", str(tmp_path)]) == 2
+    assert "would both be drawn as" in capsys.readouterr().err
 
 
 def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys):

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from anytime.pictures import BARS, duration, elided, figure, line_chart, number, sparkline
+from anytime.pictures import BARS, duration, elided, figure, line_chart, number, sparkline, thinned
 
 finite = st.floats(-1e6, 1e6)
 
@@ -96,16 +97,37 @@ def test_every_chart_is_well_formed(chart):
     svg = line_chart(series, bands=bands, x_label="<x>", y_label='"y" & z', title=title)
     tree = ElementTree.fromstring(svg)
     space = "{http://www.w3.org/2000/svg}"
-    lines = tree.findall(f"{space}polyline")
+    lines = tree.findall(f"{space}path[@class='line']")
     assert len(lines) == len(series)
     assert len(tree.findall(f"{space}polygon")) == len(bands)
-    assert "nan" not in "".join(line.get("points", "") for line in lines)
+    assert "nan" not in "".join(line.get("d", "") for line in lines)
     width, height = float(tree.get("width", 0)), float(tree.get("height", 0))
     for line in lines:
-        for point in line.get("points", "").split():
+        for point in re.findall("[^ML]+", line.get("d", "")):
             x, y = map(float, point.split(","))
             assert 0 <= x <= width
             assert 0 <= y <= height
+
+
+def test_a_line_has_a_gap_where_nothing_is_known():
+    levels = [0.0, 1.0, math.nan, 1.0, 0.0]
+    svg = line_chart({"a": ([0, 1, 2, 3, 4], levels)}, x_label="x", y_label="y")
+    drawn = re.search('class="line" d="([^"]*)"', svg)
+    assert drawn is not None
+    assert drawn[1].count("M") == drawn[1].count("L") == 2
+
+
+def test_levels_without_a_range_are_drawn():
+    assert "class" in line_chart(
+        {"a": ([0, 1], [2, 2])}, x_label="x", y_label="y", y_range=(2.0, 2.0)
+    )
+
+
+@given(st.lists(finite), st.integers(1, 40))
+def test_what_is_thinned_is_in_order_and_no_more_than_was_asked_for(values, most):
+    kept = thinned(range(len(values)), most)
+    assert len(kept) == min(len(values), most)
+    assert list(kept) == sorted(set(kept))
 
 
 def test_lines_are_told_apart_without_colour_too():

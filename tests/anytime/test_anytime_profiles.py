@@ -411,7 +411,7 @@ def test_a_picture_begins_with_no_time_at_all():
     times = re.findall(r'text-anchor="middle">([^<]*)</text>', picture)
     assert times[:6] == ["0", "5", "10", "15", "20", "25"]
     left = re.findall(r'<text x="([^"]*)"[^>]*text-anchor="middle">0<', picture)
-    assert re.findall(r'<polyline points="([^,]*),', picture) == left
+    assert re.findall(r'class="line" d="M([^,]*),', picture) == left
 
 
 def test_the_picture_of_one_input_shows_what_is_to_expect_of_poor_usual_and_good_ones():

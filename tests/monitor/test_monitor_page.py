@@ -18,6 +18,7 @@ from anytime.__main__ import main
 from anytime.errors import AnytimeError
 from monitor.endings import Ending
 from monitor.logs import LogWriter, read_log, write_log
+from monitor.missions import News, Value
 from monitor.page import page_data, render, write_page
 from monitor.page.losses import costliest, waterfall
 from monitor.regrets import Fork, Regret, log_regrets
@@ -65,6 +66,36 @@ def test_the_waterfall_adds_up(logs):
             assert next_one.before == pytest.approx(one.after)
         assert steps[-1].after == pytest.approx(steps[-2].after)
         assert steps[-1].after == pytest.approx(log.net, abs=1e-6)
+
+
+def test_what_became_known_on_the_way_is_not_put_down_to_driving(tmp_path, mission, floor, report):
+    at, worth = 0.5 * report.frames[-1].ended, float(mission.value.worth)
+    told = replace(mission, news=News(at, Value("linear", 2.0 * worth, mission.value.seconds)))
+    log = read_log(write_log(tmp_path / "a.jsonl", told, floor, report))
+    steps = {step.name: step for step in waterfall(log)}
+    assert steps["news"].size == pytest.approx(told.news.value(at) - told.value(at))
+    assert steps["drive"].size <= 0.0
+    assert steps["wait"].size <= 0.0
+    losses = page_data([log])["runs"][0]["losses"]
+    assert "What became known on the way added" in losses
+
+
+def test_missions_that_share_a_policy_are_told_apart(tmp_path, mission, floor, made_up):
+    logs = [
+        read_log(write_log(tmp_path / f"{seed}.jsonl", mission, floor, replace(told, seed=seed)))
+        for seed, told in enumerate((made_up(3, "min"), made_up(4, "min")))
+    ]
+    names = [run["name"] for run in page_data(logs)["runs"]]
+    assert names == ["min, seed 0", "min, seed 1"]
+    assert len({run["name"] for run in page_data([*logs, logs[0]])["runs"]}) == 3
+
+
+def test_one_result_is_no_verdict(tmp_path, mission, floor, made_up):
+    log = read_log(write_log(tmp_path / "a.jsonl", mission, floor, made_up(3, "min")))
+    call = replace_struct(log.frames[0].calls[0], advertised=0.5, estimate=0.9)
+    frame = replace_struct(log.frames[0], calls=(call,))
+    told = page_data([replace(log, frames=(frame,))])["runs"][0]["profile"]
+    assert told.startswith("One result says little: .50 advertised, .90 seen")
 
 
 def test_a_mission_that_was_not_reached_earns_nothing(tmp_path, mission, floor, report):
@@ -117,7 +148,7 @@ def test_the_sentence_says_what_more_thinking_would_have_gained(logs):
 
 def test_without_a_fixed_mission_the_page_says_how_to_get_one(logs):
     alone = page_data(logs[:1])["runs"][0]["frames"][1]["moments"][0]["fixed"]
-    assert "anytime run MISSION --policy fixed --seed 3" in alone
+    assert "[fixed] in its file, or a log of policy fixed on the same seed" in alone
     beside = page_data(logs)["runs"][0]["frames"][1]["moments"][0]["fixed"]
     assert "Fixed would have given see 700 ms and find_path 300 ms" in beside
 
