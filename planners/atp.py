@@ -21,7 +21,7 @@ import anytime
 from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
-from planners.improving import COUNT, CURRENT, GAIN, MEETING, SHIFT, UPPER, Run
+from planners.improving import COUNT, CURRENT, DONE, GAIN, MEETING, SHIFT, UPPER, Run
 from planners.landmarks import known_way
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.norms import expected_norm, least_norm
@@ -31,7 +31,7 @@ from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
 GRAIN = 500
 """Expansions between two steps: a fraction of a millisecond …"""
-_FIRST_GRAIN = 2 * GRAIN  # … more of them while there is no way yet that could be told
+_FIRST_GRAIN = 4 * GRAIN  # … more of them while there is no way yet that could be told
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
@@ -166,47 +166,36 @@ class _Query:
 
         Where such a search gets stuck, for so many expansions, its norm was too small.
         """
-        run, state, exact = self.run, self.run.state, scale is None
-        known = not math.isinf(self.cost)
+        state, known = self.run.state, not math.isinf(self.cost)
         if scale is not None and known:
             self._expect(1.0)
-            expected = int(improving.estimated(self.down, self.across, run.norm))
+            expected = int(improving.estimated(self.down, self.across, self.run.norm))
             scale = max(scale, _TRUSTED * self.cost / expected)
-        self._expect(scale)
-        improving.begin(
-            self.grid.cost, self.grid.shape[1], self.start, self.goal,
-            int(self.cost) if known else SPAN, exact, run,
-        )  # fmt: skip
-        if known:
-            way_in_hand.follow_way(*self._map, run)
-        else:
-            state[COUNT] = 0
+        query = (*self._map, self.start, self.goal, self.diagonals, self.run)
+        density = 0.0 if scale is None else self.grid.features[0]
+        upper = int(self.cost) if known else SPAN
         grain = GRAIN if known else _FIRST_GRAIN
-        spent, done, left = 0, OUT_OF_BUDGET, patience
-        while done == OUT_OF_BUDGET and spent < budget:
-            most = min(grain, budget - spent)
-            done, taken = improving.search(*self._map, self.goal, self.diagonals, run, most)
-            spent += taken
+        found, taken = way_in_hand.set_out(*query, min(grain, budget), upper, density, scale or 0.0)
+        left = patience
+        while True:
+            budget -= taken
             left -= taken
-            if done == OUT_OF_BUDGET:
-                if state[MEETING] >= 0:
-                    self.cost = int(state[UPPER] - state[GAIN])
-                if exact:
-                    self.least = max(self.least, int(state[CURRENT]) << int(state[SHIFT]))
-                elif scale is not None and left < 0:
-                    scale, left = 1.25 * scale, patience
-                    self._expect(scale)
-                    improving.reweigh(self.grid.shape[1], self.goal, run)
-                yield float(taken)
-        if done == OUT_OF_BUDGET:
-            if state[MEETING] >= 0:
-                self.cost = int(way_in_hand.take_up(*self._map, self.start, self.diagonals, run))
-            return
-        if state[MEETING] >= 0:
-            self.cost = int(way_in_hand.take_up(*self._map, self.start, self.diagonals, run))
-        if exact:
-            self.least = self.cost
-        yield float(taken)
+            if (reached := int(state[UPPER] - state[GAIN])) < SPAN:
+                self.cost = reached
+            if scale is None:
+                low = int(state[CURRENT]) << int(state[SHIFT])
+                self.least = self.cost if found == DONE else max(self.least, low)
+            elif found == OUT_OF_BUDGET and left < 0:
+                scale, left = 1.25 * scale, patience
+                self._expect(scale)
+                improving.reweigh(self.grid.shape[1], self.goal, self.run)
+            yield float(taken)
+            if found == DONE or budget <= 0:
+                break
+            found, taken = way_in_hand.go_on(*query, min(grain, budget))
+        if found == OUT_OF_BUDGET and state[MEETING] >= 0:
+            way_in_hand.take_up(*self._map, self.start, self.diagonals, self.run)
+            self.cost = int(state[UPPER])
 
     def _expect(self, scale: float | None) -> None:
         if scale is None:
@@ -241,7 +230,7 @@ class _Query:
             while found == OUT_OF_BUDGET:
                 found, taken = region_search.search_regions(
                     *soft, self.goal, self.diagonals, percent, grid.regions, run, distances,
-                    _FIRST_GRAIN * blocks.EXPANDED // 2,
+                    GRAIN * blocks.EXPANDED,
                 )  # fmt: skip
                 work += taken
                 self.coarse += taken / blocks.EXPANDED
@@ -300,9 +289,9 @@ class _Query:
         """The best way so far, as a plan without any abstraction."""
         way = self.run.path[: self.run.state[COUNT]]
         if self.run.state[MEETING] >= 0:
-            way = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
             # Labels that were corrected since may have made it even shorter than was told.
-            self.cost = int(way_cost(*self._map, way, 0, len(way) - 1))
+            way, cost = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
+            self.cost = int(cost)
         return way_plan(way, self.grid.shape[1], self.cost, self.least)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planners.frontier import next_base
 from planners.search import (
     ACROSS,
     DIAGONAL,
@@ -19,27 +18,30 @@ from planners.search import (
     EIGHT_WAYS,
     FIRST,
     FOUR_WAYS,
-    LAST,
     OUT_OF_BUDGET,
     SET_OUT,
-    SPAN,
     STEP,
     STRAIGHT,
     WALL,
 )
 
-CALLED = "d52e87379353"
+CALLED = "faffbc721331"
 
 DONE = 0
 BUCKETS = 1 << 13
 BASE, SHIFT, CURRENT, LOW, HIGH, OPENED, FRESH, UNUSED = range(8)
-EXACT, FOLLOWS, UPPER, GAIN, MEETING, COUNT, POSITION = range(8, 15)
+EXACT, FOLLOWS, UPPER, GAIN, MEETING, COUNT, POSITION, CLOCK = range(8, 16)
 """State of a search: base of its labels; width of a bucket, as a shift; the bucket at work, the
 lowest and the highest used; entries in all of them; the first entry never used, the first given
 back. Whether its norm is a lower bound; whether it knows the way's cost up to each cell; cost of
 the way in hand; by how much it is beaten, and at which cell. Of the way: its cells; where the next
-window begins."""
+window begins. Up to where bases have been used."""
 NOTHING = -1
+CELL, AFTER = 0, 1  # columns of `Run.entry`
+CLOSED, SIDE, LENGTH = 1, 1, 4
+"""A label's lowest bit is set when the cell is closed. Above it is the side to which its way came,
+and from bit `LENGTH` on `base` - g."""
+_LAST = 1 << 58
 _NARROW = 12  # 4 096 is less than the smallest positive step of f on a free floor
 _ENTRIES = 8
 
@@ -47,19 +49,16 @@ _ENTRIES = 8
 class Run(NamedTuple):
     """Arrays of one planner at work. They are zeroed pages until they are touched.
 
-    Of every cell: label (`base` - g, one less when it is closed), came (the side to which the way
-    to it came), prefix (`base` + cost of the way in hand up to the cell). bucket: the first entry
-    of each. entry, behind: an entry's cell and the entry after it. norm: the heuristic, see
+    Of every cell: label (see `LENGTH`; one array, for to look at it costs more than to take it
+    apart), prefix (`base` + cost of the way in hand up to the cell). bucket: the first entry of
+    each. entry: its cell and the entry after it. norm: the heuristic, see
     `estimated`. path: flat indices of the way in hand.
     """
 
-    clock: NDArray[np.int64]
     label: NDArray[np.int64]
-    came: NDArray[np.uint8]
     prefix: NDArray[np.int64]
     bucket: NDArray[np.int32]
     entry: NDArray[np.int32]
-    behind: NDArray[np.int32]
     norm: NDArray[np.int64]
     path: NDArray[np.int32]
     state: NDArray[np.int64]
@@ -69,16 +68,13 @@ def new_run(rows: int, columns: int) -> Run:
     """Arrays for a map of that size."""
     cells = rows * columns
     return Run(
-        clock=np.zeros(1, np.int64),
         label=np.zeros(cells, np.int64),
-        came=np.zeros(cells, np.uint8),
         prefix=np.zeros(cells, np.int64),
         bucket=np.full(BUCKETS, NOTHING, np.int32),
-        entry=np.zeros(_ENTRIES * cells, np.int32),
-        behind=np.zeros(_ENTRIES * cells, np.int32),
+        entry=np.zeros((_ENTRIES * cells, 2), np.int32),
         norm=np.zeros(6, np.int64),
         path=np.zeros(cells + 1, np.int32),
-        state=np.zeros(15, np.int64),
+        state=np.zeros(16, np.int64),
     )
 
 
@@ -115,9 +111,15 @@ def _width(rows, columns, norm):
 def begin(cost, columns, start, goal, upper, exact, run):
     """Begin a search by `run.norm`, which is `exact` if it never says too much, whose result must
     cost less than `upper`."""
-    if run.clock[0] >= LAST:  # the labels are about to be cleared: these go by the same bases
+    state, norm, bucket = run.state, run.norm, run.bucket
+    # Labels go below the base and prefixes above it by less than `upper`, so that none of an
+    # earlier search is taken for one of this.
+    if state[CLOCK] > _LAST - 2 * upper:
+        run.label[:] = 0
         run.prefix[:] = 0
-    base, state, norm, bucket = next_base(run), run.state, run.norm, run.bucket
+        state[CLOCK] = 0
+    base = state[CLOCK] + upper
+    state[CLOCK] = base + upper
     for place in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
         bucket[place & (BUCKETS - 1)] = NOTHING
     shift = _width(cost.size // columns, columns, norm)
@@ -127,8 +129,8 @@ def begin(cost, columns, start, goal, upper, exact, run):
     state[OPENED], state[FRESH], state[UNUSED] = 1, 1, NOTHING
     state[UPPER], state[GAIN], state[MEETING] = upper, 0, NOTHING
     state[FOLLOWS] = 0
-    run.label[start], run.came[start] = base, SET_OUT
-    run.entry[0], run.behind[0] = start, NOTHING
+    run.label[start] = base << LENGTH
+    run.entry[0, CELL], run.entry[0, AFTER] = start, NOTHING
     bucket[state[CURRENT] & (BUCKETS - 1)] = 0
 
 
@@ -145,11 +147,11 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
     """
     # Arrays are taken out of the tuple once: inside the loop that would count references.
     state, label, prefix, norm = run.state, run.label, run.prefix, run.norm
-    bucket, entry, behind = run.bucket, run.entry, run.behind
+    bucket, entry = run.bucket, run.entry
     one_far, one_near, two_far, two_near, three_far, three_near = (
         norm[0], norm[1], norm[2], norm[3], norm[4], norm[5],
     )  # fmt: skip
-    came, onward = run.came, EIGHT_WAYS if diagonals else FOUR_WAYS
+    onward = EIGHT_WAYS if diagonals else FOUR_WAYS
     apart = np.empty(8, np.int64)
     for side in range(8):
         apart[side] = DOWN[side] * columns + ACROSS[side]
@@ -160,7 +162,7 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
     goal_row, goal_column = goal // columns, goal % columns
     inverse = 1.0 / columns  # a division of integers would take a third of the time
     upper, expansions, found = state[UPPER] - state[GAIN], 0, DONE
-    stale = base - SPAN
+    stale = base - state[UPPER]
     while opened > 0:
         place = np.int64(bucket[current & (BUCKETS - 1)])
         if place < 0:
@@ -171,14 +173,14 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
         if expansions >= budget:
             found = OUT_OF_BUDGET
             break
-        bucket[current & (BUCKETS - 1)] = behind[place]
-        behind[place], unused = unused, place
+        bucket[current & (BUCKETS - 1)] = entry[place, AFTER]
+        entry[place, AFTER], unused = unused, place
         opened -= 1
-        node = np.int64(entry[place])
+        node = np.int64(entry[place, CELL])
         mine = label[node]
-        if mine & 1:  # closed
+        if mine & CLOSED:
             continue
-        g = base - mine
+        g = base - (mine >> LENGTH)
         row = int((node + 0.5) * inverse)
         column = node - row * columns
         down, along = row - goal_row, column - goal_column
@@ -192,7 +194,7 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
         )
         if f >> shift != current or f >= upper:  # it has another entry, or cannot beat the way
             continue
-        label[node] = mine - 1
+        label[node] = mine | CLOSED
         if follows and prefix[node] >= base and prefix[node] - base - g > state[GAIN]:
             state[GAIN], state[MEETING] = prefix[node] - base - g, node
             upper = state[UPPER] - state[GAIN]
@@ -208,7 +210,8 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
             there_row, there_column = row + DOWN[side], column + ACROSS[side]
             if inside or (0 <= there_row < rows and 0 <= there_column < columns):
                 free |= int(cost[node + apart[side]] != wall) << side
-        wanted = np.int64(onward[np.int64(came[node] if wall == 0 else SET_OUT) * 256 + free])
+        came = (mine >> SIDE) & 7 if wall == 0 and g > 0 else SET_OUT
+        wanted = np.int64(onward[came * 256 + free])
         while wanted:
             side = np.int64(FIRST[wanted])
             wanted &= wanted - 1
@@ -220,10 +223,11 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
                     dearest = max(dearest, int(cost[node + dc]), int(cost[node + dr * columns]))
             new_g = g + STEP[side] * dearest
             old = label[there]
-            if base - new_g <= old + 1:
+            least = old >> LENGTH
+            if base - new_g <= least:
                 continue
-            known = old > stale
-            if known and old & 1 and not exact:
+            known = least > stale
+            if known and old & CLOSED and not exact:
                 continue
             far, near = abs(down + dr), abs(along + dc)
             if near > far:
@@ -235,17 +239,17 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
             )
             if new_g + h >= upper:
                 continue
-            label[there], came[there] = base - new_g, side
+            label[there] = (base - new_g) << LENGTH | side << SIDE
             number = (new_g + h) >> shift
-            old_f = base - old + h  # beyond the upper end its entry may have been passed over
-            if known and not old & 1 and old_f < upper and old_f >> shift == number:
+            old_f = base - least + h  # beyond the upper end its entry may have been passed over
+            if known and not old & CLOSED and old_f < upper and old_f >> shift == number:
                 continue
             if unused >= 0:
-                place, unused = unused, np.int64(behind[unused])
+                place, unused = unused, np.int64(entry[unused, AFTER])
             else:
                 place = fresh
                 fresh += 1
-            entry[place], behind[place] = there, bucket[number & (BUCKETS - 1)]
+            entry[place, CELL], entry[place, AFTER] = there, bucket[number & (BUCKETS - 1)]
             bucket[number & (BUCKETS - 1)] = place
             opened += 1
             if number < current:
@@ -261,25 +265,25 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
 @njit(cache=True, nogil=True, error_model="numpy")
 def reweigh(columns, goal, run):
     """Go on with another norm that is not exact: put what is open into other buckets."""
-    state, label, bucket, entry, behind = run.state, run.label, run.bucket, run.entry, run.behind
+    state, label, bucket, entry = run.state, run.label, run.bucket, run.entry
     waiting, count, rows = np.empty(state[OPENED], np.int32), 0, label.size // columns
     for number in range(state[LOW], min(state[HIGH] + 1, state[LOW] + BUCKETS)):
         place = np.int64(bucket[number & (BUCKETS - 1)])
         bucket[number & (BUCKETS - 1)] = NOTHING
         while place >= 0:
-            waiting[count] = entry[place]
+            waiting[count] = entry[place, CELL]
             count += 1
-            place = np.int64(behind[place])
+            place = np.int64(entry[place, AFTER])
     state[LOW], state[HIGH], state[UNUSED] = 1 << 60, 0, NOTHING
     state[SHIFT] = _width(rows, columns, run.norm)
     opened = 0
     for place in range(count):
         node = np.int64(waiting[place])
-        if label[node] & 1:
+        if label[node] & CLOSED:
             continue
         h = estimated(node // columns - goal // columns, node % columns - goal % columns, run.norm)
-        number = (state[BASE] - label[node] + h) >> state[SHIFT]
-        entry[opened], behind[opened] = node, bucket[number & (BUCKETS - 1)]
+        number = (state[BASE] - (label[node] >> LENGTH) + h) >> state[SHIFT]
+        entry[opened, CELL], entry[opened, AFTER] = node, bucket[number & (BUCKETS - 1)]
         bucket[number & (BUCKETS - 1)] = opened
         opened += 1
         state[LOW], state[HIGH] = min(state[LOW], number), max(state[HIGH], number)

@@ -3,55 +3,109 @@
 import numpy as np
 from numba import njit
 
-from planners.frontier import path_to, way_cost, with_room
+from planners.frontier import step_cost, way_cost, with_room
 from planners.improving import (
     BASE,
     COUNT,
+    DONE,
     FOLLOWS,
+    GAIN,
+    LENGTH,
     MEETING,
     NOTHING,
     POSITION,
+    SIDE,
+    UPPER,
     begin,
     estimated,
     search,
 )
+from planners.norms import expected_norm, least_norm
+from planners.search import ACROSS, DIAGONAL, DOWN, SPAN, STEP, STRAIGHT
 
-CALLED = "1bd60240246b"
+CALLED = "24660e8435b5"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def way_to(cost, wall, columns, start, node, diagonals, run):
+    """The way from `start` to `node` by the labels of the last search, flat indices, and its cost.
+
+    It goes by the sides to which ways came, but diagonally where that costs no more: among ways
+    that the search holds equal, from those the next search was measured to gain more.
+    """
+    label, rows = run.label, cost.size // columns
+    apart = np.empty(8, np.int64)
+    for side in range(8):
+        apart[side] = DOWN[side] * columns + ACROSS[side]
+    row, column, length = node // columns, node % columns, 0
+    most = (run.state[BASE] - (label[node] >> LENGTH)) // STRAIGHT + 1  # no step costs less
+    way = np.empty(min(most, cost.size), np.int32)
+    first = way.size - 1
+    way[first] = node
+    while node != start:
+        best, least = (label[node] >> SIDE) & 7, label[node] >> LENGTH
+        if diagonals and best < 4:
+            inside = 0 < row < rows - 1 and 0 < column < columns - 1
+            for side in range(4, 8):
+                there_row, there_column = row - DOWN[side], column - ACROSS[side]
+                if not inside and not (0 <= there_row < rows and 0 <= there_column < columns):
+                    continue
+                there = node - apart[side]
+                if (label[there] >> LENGTH) - DIAGONAL < least:
+                    continue
+                step = step_cost(cost, wall, columns, there, DOWN[side], ACROSS[side])
+                if step > 0 and (label[there] >> LENGTH) - step >= least:
+                    best, least = side, (label[there] >> LENGTH) - step
+        down, across = DOWN[best], ACROSS[best]
+        node, row, column = node - apart[best], row - down, column - across
+        step = STEP[best] if wall == 0 else step_cost(cost, wall, columns, node, down, across)
+        length += step
+        first -= 1
+        way[first] = node
+    return way[first:], length
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def so_far(cost, wall, columns, start, diagonals, run):
     """The way as a search that has beaten it, and still goes on, has made it shorter so far: flat
-    indices."""
+    indices, and its cost."""
     count, node, path = run.state[COUNT], run.state[MEETING], run.path
-    beginning = path_to(cost, wall, columns, start, node, diagonals, run)
+    beginning, length = way_to(cost, wall, columns, start, node, diagonals, run)
     if count == 0 or node == path[count - 1]:
-        return beginning
+        return beginning, length
     rest = count - 1  # its last visit, should the way go in a circle
     while path[rest] != node:
         rest -= 1
     way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
     for place in range(rest + 1, count):
         way[beginning.size + place - rest - 1] = path[place]
-    return way
+    return way, length + _left(run, node)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def take_up(cost, wall, columns, start, diagonals, run):
     """Take up what the last search found: its way to `MEETING`, and then the way in hand.
 
-    Returns the cost of the new way.
+    `UPPER` is what the new way costs.
     """
-    node, count, path = run.state[MEETING], run.state[COUNT], run.path
+    state, path = run.state, run.path
+    node, count = state[MEETING], state[COUNT]
+    beginning, length = way_to(cost, wall, columns, start, node, diagonals, run)
     rest = count - 1
-    beginning = path_to(cost, wall, columns, start, node, diagonals, run)
-    run.state[MEETING] = NOTHING
-    while rest > 0 and path[rest] != node:
-        rest -= 1
-    _replace(run, 0, min(rest, count - 1), beginning)
-    return way_cost(cost, wall, columns, path, 0, run.state[COUNT] - 1)
+    if count > 0 and node != path[rest]:
+        while path[rest] != node:
+            rest -= 1
+        length += _left(run, node)
+    _replace(run, 0, rest, beginning)
+    state[UPPER], state[GAIN], state[MEETING] = length, 0, NOTHING
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _left(run, node):
+    """What the way in hand, as it was when the search began, costs from one of its cells on."""
+    return run.state[UPPER] - (run.prefix[node] - run.state[BASE])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -69,6 +123,34 @@ def _replace(run, first, last, piece):
     for place in range(piece.size):
         path[first + place] = piece[place]
     run.state[COUNT] = count + grown
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def set_out(cost, wall, columns, start, goal, diagonals, run, budget, upper, density, scale):
+    """Begin a search for a way that costs less than `upper` and `go_on` with it.
+
+    The way in hand costs as much; if that is `SPAN`, there is none. The search expects `scale`
+    times the norm of the density, or the least way if that is 0.
+    """
+    if scale > 0.0:
+        expected_norm(density, scale, diagonals, run.norm)
+    else:
+        least_norm(diagonals, run.norm)
+    begin(cost, columns, start, goal, upper, scale == 0.0, run)
+    if upper < SPAN:
+        follow_way(cost, wall, columns, run)
+    else:
+        run.state[COUNT] = 0
+    return go_on(cost, wall, columns, start, goal, diagonals, run, budget)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def go_on(cost, wall, columns, start, goal, diagonals, run, budget):
+    """Go on with a search as `improving.search` does, and when it is done take up what it found."""
+    found, taken = search(cost, wall, columns, goal, diagonals, run, budget)
+    if found == DONE and run.state[MEETING] >= 0:
+        take_up(cost, wall, columns, start, diagonals, run)
+    return found, taken
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -103,7 +185,7 @@ def improve_windows(cost, wall, columns, length, diagonals, run, budget):
             _, taken = search(cost, wall, columns, goal, diagonals, run, _WINDOW_BUDGET)
             expansions += taken
             if state[MEETING] >= 0:
-                piece = path_to(cost, wall, columns, start, goal, diagonals, run)
+                piece, _ = way_to(cost, wall, columns, start, goal, diagonals, run)
                 _replace(run, first, last, piece)
                 last = first + piece.size - 1
         state[POSITION] = last if last == state[COUNT] - 1 else first + max(1, (last - first) // 2)

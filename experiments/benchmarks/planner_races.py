@@ -27,6 +27,7 @@ _RESAMPLES = 500
 _CHUNK = 4  # instances a worker takes at a time
 _TIMED = 0.9925  # a timed run is over when its plan is this good …
 ENOUGH = 0.6  # … or when it has done so large a share of A*'s work
+_TIMING = 0.1  # seconds for which a short race is repeated: one interruption must not decide it
 
 
 @dataclass(frozen=True)
@@ -167,11 +168,13 @@ def _qualities(tracks: Sequence[Track], shares: NDArray[np.float64]) -> NDArray[
 def timed(found: Race, *, repeats: int = 3, grid: Grid | None = None) -> list[tuple[float, float]]:
     """ATP's track against time, in shares of our A*'s, interleaved with it: medians of repeats.
 
+    repeats: the least number of them; there are more while they take less than `_TIMING`.
     grid: the map with what earlier queries have found out; a new one each time if None.
     """
     free, start, goal = found.problem.load()
     theirs, ours, qualities = [], [], []
-    for _ in range(repeats):
+    end = time.perf_counter() + _TIMING
+    while len(ours) < repeats or time.perf_counter() < end:
         begin = time.perf_counter()
         best = astar(free, start, goal)
         theirs.append(time.perf_counter() - begin)

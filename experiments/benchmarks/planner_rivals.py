@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners import Grid, ara, paper_atp, steps
-from planners.frontier import path_to
 from planners.grids import endpoints
 from planners.improving import DONE, GAIN, MEETING, UPPER, begin, new_run, search
 from planners.multipath import NO_WAY, Step, way_plan
 from planners.norms import least_norm
 from planners.path_finding import Cell
 from planners.search import OUT_OF_BUDGET, SPAN
+from planners.way_in_hand import way_to
 
 RESTARTS = (3.0, 2.0, 1.5, 1.3, 1.2, 1.1, 1.05, 1.0)
 _GRAIN = 1000
@@ -45,7 +45,7 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
             plan = None
             if found == DONE and run.state[MEETING] >= 0:
                 known = float(run.state[UPPER] - run.state[GAIN])
-                way = path_to(grid.cost, grid.wall, columns, first, last, True, run)
+                way, _ = way_to(grid.cost, grid.wall, columns, first, last, True, run)
                 plan = way_plan(way, columns, known, known / weight)
             yield Step(float(taken), plan)
     if known == SPAN:

@@ -97,6 +97,7 @@ def _run(log: Log, division: Mapping[str, Any] | None) -> dict[str, Any]:
     ranked = costliest(log)
     place = {loss.index: (loss, rank) for rank, loss in enumerate(ranked, 1)}
     return {
+        "policy": mission.policy,
         "mission": mission.name,
         "seed": mission.seed,
         "machine": mission.machine,

@@ -12,7 +12,7 @@ function draw() {
   drawTabs();
   const head = document.createElement("b");
   head.textContent = it.mission;
-  $("mission").replaceChildren(head, ` · ${it.name}, seed ${it.seed}${it.machine ? ` on machine ${it.machine}` : ""} · ${it.state}`);
+  $("mission").replaceChildren(head, ` · ${it.policy}, seed ${it.seed}${it.machine ? ` on machine ${it.machine}` : ""} · ${it.state}`);
   write("losses", it.losses); write("profile", it.profile);
   if (!now) {
     write("sentence", it.ending ? "It ended before a frame was over: 0 decisions." : "No frame is over yet: 0 decisions so far.");

@@ -5,7 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planners import astar, route
+from planners.frontier import way_cost
 from planners.improving import (
+    COUNT,
     DONE,
     GAIN,
     MEETING,
@@ -47,8 +49,10 @@ def found(cost, wall, columns, grain, scales=()):
     if run.state[MEETING] < 0:
         return None
     told = int(run.state[UPPER] - run.state[GAIN])
-    walked = int(take_up(cost, wall, columns, 0, True, run))
+    take_up(cost, wall, columns, 0, True, run)
+    walked = int(run.state[UPPER])
     assert walked <= told
+    assert walked == way_cost(cost, wall, columns, run.path, 0, run.state[COUNT] - 1)
     return walked
 
 
