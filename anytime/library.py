@@ -20,6 +20,7 @@ from anytime.recordings import Recording
 
 PROFILE = "anytime.profile/1"
 MACHINE = "anytime.machine/1"
+_COUNTABLE = 2**53  # more than any run registers; beyond it floats do not count
 UNSURE = 2.0  # times as fast or slow as where it was measured that a machine may be
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]{0,99}(@[A-Za-z0-9_.=,-]{1,99})?")
 
@@ -213,6 +214,8 @@ def _restored_run(path: Path, index: int, run: _Run, profile: _Profile) -> Recor
     for name, column in (("seconds", run.seconds), ("work", run.work)):
         if any(b < a for a, b in pairwise(column)) or (column and column[0] < 0):
             raise refuse(f"{name} must not decrease or be negative")
+    if max(run.results, run.steps) > _COUNTABLE:
+        raise refuse(f"says {max(run.results, run.steps)} results or steps, which cannot be")
     if min(run.results, run.steps) < 0 or 0 < run.results < count:
         raise refuse(f"has {count} results, and says {run.results} in {run.steps} steps are all")
     if min(run.end) < 0:

@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 LEVELS = 16  # of an intermediate result, besides "no result"
 TIMES = 96  # moments of a module at which its time may end
 JOINT = 8192  # combinations of input levels of one node, at most
+_AT_ONCE = 1e-9  # seconds: the least that is kept apart from none when shares are added
 KNOWN = np.array([0.0, 1.0])  # levels of an input that a test is: it is there and right
 
 
@@ -183,6 +184,7 @@ def _table(
         )
     times = _moments(profile)
     qualities = profile.quality_at(times)
+    times, qualities = _given_time(times, qualities)
     levels, bins = levels_of(qualities, 2 * LEVELS if output else LEVELS)
     sources = [made[source.label] for source in feeding.values()]
     shape = tuple(len(source.levels) for source in sources)
@@ -234,6 +236,21 @@ def _moments(profile: Profile) -> Floats:
     spaced: Floats = np.interp(levels, gained, np.arange(len(every)))
     evenly = np.linspace(0, len(every) - 1, TIMES - TIMES // 2)
     return every[np.unique(np.concatenate([spaced, evenly]).round().astype(int))]
+
+
+def _given_time(times: Floats, qualities: Floats) -> tuple[Floats, Floats]:
+    """Moments and qualities [runs, moments] with nothing at 0: a call without time is not run.
+
+    What is there at once, as of a module that costs nothing on a work clock, needs `_AT_ONCE`.
+    """
+    soon = int(np.searchsorted(times, _AT_ONCE, side="right")) - 1  # the last of those moments
+    if np.isnan(qualities[:, soon]).all():
+        return times, qualities
+    nothing = np.full((len(qualities), 1), np.nan)
+    return (
+        np.concatenate([[0.0, _AT_ONCE], times[soon + 1 :]]),
+        np.concatenate([nothing, qualities[:, soon:]], axis=1),
+    )
 
 
 def levels_of(qualities: Floats, count: int) -> tuple[Floats, NDArray[np.intp]]:

@@ -26,6 +26,7 @@ from planners.landmarks import known_way
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.norms import expected_norm, least_norm
 from planners.path_finding import Cell
+from planners.pool import Pool
 from planners.problems import known_floors, walked_quality
 from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
@@ -66,7 +67,7 @@ def steps(
     """
     grid = domain if isinstance(domain, Grid) else Grid(domain)
     first, last, diagonals = endpoints(grid, start, goal, connectivity)
-    run, changes = _borrow(grid.shape), grid.changes
+    run, changes = _runs.take(grid.shape), grid.changes
     try:
         query = _Query(grid, first, last, diagonals, run)
         best, proven = math.inf, False
@@ -80,16 +81,11 @@ def steps(
         if math.isinf(best):
             yield Step(0.0, NO_WAY)
     finally:
-        _runs[grid.shape].append(run)
+        _runs.put_back(grid.shape, run)
 
 
-_runs: dict[tuple[int, int], list[Run]] = {}
-
-
-def _borrow(shape: tuple[int, int]) -> Run:
-    """Arrays for a map of that size: those that an earlier planner has done with, or new ones."""
-    kept = _runs.setdefault(shape, [])
-    return kept.pop() if kept else improving.new_run(*shape)
+_runs = Pool(improving.new_run)
+_region_runs = Pool(region_search.new_region_run)
 
 
 class _Query:
@@ -216,7 +212,7 @@ class _Query:
 
     def over_regions(self) -> Iterator[float]:
         """A first way over the graph of regions, or a better one."""
-        grid, run, soft = self.grid, _borrow_regions(self.grid.shape), self._soft
+        grid, run, soft = self.grid, _region_runs.take(self.grid.shape), self._soft
         distances = grid.landmarks.tables.far
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
@@ -246,7 +242,7 @@ class _Query:
                 soft[-1], self.goal, self.diagonals, grid.regions, run
             )
         finally:
-            _region_runs[grid.shape].append(run)
+            _region_runs.put_back(grid.shape, run)
         path, before = self.run.path, self._in_hand()
         count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, path)
         self._choose(int(count), int(way_cost(*self._map, path, 0, count - 1)), before)
@@ -293,14 +289,6 @@ class _Query:
             way, cost = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
             self.cost = int(cost)
         return way_plan(way, self.grid.shape[1], self.cost, self.least)
-
-
-_region_runs: dict[tuple[int, int], list[region_search.RegionRun]] = {}
-
-
-def _borrow_regions(shape: tuple[int, int]) -> region_search.RegionRun:
-    kept = _region_runs.setdefault(shape, [])
-    return kept.pop() if kept else region_search.new_region_run(*shape)
 
 
 def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:

@@ -31,6 +31,7 @@ from experiments.benchmarks.planner_races import (
     share_at,
     shares_at,
     timed,
+    timed_once,
 )
 from experiments.benchmarks.planner_sampling import sampled
 from planners import Grid, astar, blind_quality, paper_atp, textbook_astar
@@ -185,7 +186,7 @@ def _race_all(
 
 def timed_all(found: Sequence[Race], repeats: int) -> list[Track]:
     """ATP's tracks against time, in shares of our A*'s, nothing being known of the maps before."""
-    timed(found[0], repeats=1)  # loads machine code, which the races did in other processes
+    timed_once(found[0])  # loads machine code, which the races did in other processes
     return [timed(each, repeats=repeats) for each in found]
 
 
@@ -196,7 +197,7 @@ def timed_kept(found: Sequence[Race], repeats: int) -> list[Track]:
         mine = [each for each in found if each.problem.map == file]
         grids[file] = Grid.known(mine[0].problem.load()[0])
         for each in islice(cycle(mine), _EARLIER):
-            timed(each, repeats=1, grid=grids[file])
+            timed_once(each, grids[file])
     return [timed(each, repeats=repeats, grid=grids[each.problem.map]) for each in found]
 
 

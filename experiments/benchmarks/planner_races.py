@@ -171,25 +171,36 @@ def timed(found: Race, *, repeats: int = 3, grid: Grid | None = None) -> list[tu
     repeats: the least number of them; there are more while they take less than `_TIMING`.
     grid: the map with what earlier queries have found out; a new one each time if None.
     """
-    free, start, goal = found.problem.load()
-    theirs, ours, qualities = [], [], []
+    theirs: list[float] = []
+    ours: list[list[float]] = []
+    known: list[float] = []
     end = time.perf_counter() + _TIMING
     while len(ours) < repeats or time.perf_counter() < end:
-        begin = time.perf_counter()
-        best = astar(free, start, goal)
-        theirs.append(time.perf_counter() - begin)
-        assert best is not None
-        spent, stamps, qualities = 0.0, [], []
-        begin = time.perf_counter()
-        for step in PLANNERS["atp"](grid or Grid.known(free), start, goal):
-            spent += step.work
-            if step.plan is not None and step.plan.level == 0:
-                stamps.append(time.perf_counter() - begin)
-                qualities.append(best.length / step.plan.length)
-                if qualities[-1] >= _TIMED:
-                    break
-            if spent > ENOUGH * found.work:
-                break
+        seconds, stamps, qualities = timed_once(found, grid)
+        if qualities != known:  # the map has learnt more, so what was timed before is another race
+            theirs, ours, known = [], [], qualities
+        theirs.append(seconds)
         ours.append(stamps)
     steps = np.median(np.array(ours), axis=0) / np.median(theirs)
-    return list(zip(steps.tolist(), qualities, strict=True))
+    return list(zip(steps.tolist(), known, strict=True))
+
+
+def timed_once(found: Race, grid: Grid | None = None) -> tuple[float, list[float], list[float]]:
+    """A*'s seconds, and the seconds and qualities of ATP's plans after it."""
+    free, start, goal = found.problem.load()
+    begin = time.perf_counter()
+    best = astar(free, start, goal)
+    seconds = time.perf_counter() - begin
+    assert best is not None
+    spent, stamps, qualities = 0.0, [], []
+    begin = time.perf_counter()
+    for step in PLANNERS["atp"](grid or Grid.known(free), start, goal):
+        spent += step.work
+        if step.plan is not None and step.plan.level == 0:
+            stamps.append(time.perf_counter() - begin)
+            qualities.append(best.length / step.plan.length)
+            if qualities[-1] >= _TIMED:
+                break
+        if spent > ENOUGH * found.work:
+            break
+    return seconds, stamps, qualities

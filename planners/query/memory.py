@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from operator import index
 from typing import Any
 
 import numpy as np
 
+from anytime.errors import AnytimeError
 from planners.query import choosing
 from planners.query.header import HEADER
 
@@ -25,6 +27,14 @@ _TABLES = {  # field of the header: type, shape by name of size, filler
     "steps": (np.float64, ("parts",), 0.4),
     "begins": (np.int32, ("parts",), 0),
 }
+
+
+def random_state(seed: Any) -> int:
+    """The state of a generator with that seed. Raises AnytimeError for what is no integer."""
+    try:
+        return index(seed) % 2**64
+    except TypeError:
+        raise AnytimeError(f"seed is {seed!r}; give an integer") from None
 
 
 class Memory:

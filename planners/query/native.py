@@ -122,6 +122,9 @@ def _number(rng, source):
 @overload_method(PathType, "at", prefer_literal=True)
 def _at(rng, name, place=0):
     number = _number(rng, name)
+    place = getattr(place, "value", place)  # of one that was left out
+    if not isinstance(place, int | types.Integer | types.IntegerLiteral):
+        raise TypingError(f"at(name, place) takes an integer place, not {place}")
 
     def at(rng, name, place=0):
         if place < 0:
@@ -230,12 +233,35 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
             built[id(function.original)] = _compiled(made, inlined)
     dispatcher = built[id(text.functions[-1].original)]
     try:
-        dispatcher.compile(types.float64(rng, *[from_dtype(world)] * takes_world))
-    except NumbaError as error:
+        dispatcher.compile(types.float64(rng, *[_read_only(world)] * takes_world))
+    except (NumbaError, AttributeError) as error:  # numba has the latter for += on what is fixed
         raise NativeError(_explained(text, error)) from error
     compiled = next(iter(dispatcher.overloads.values()))
     address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return Native(address, bool(dispatcher.stats.cache_hits), dispatcher)
+
+
+class _Fixed(types.NestedArray):
+    """An array of the world, and what is taken from it: the compiler refuses to change it."""
+
+    def __init__(self, dtype: Any, shape: tuple[int, ...]) -> None:
+        super().__init__(dtype, shape)
+        self.name = f"fixed {self.name}"
+        self.mutable = False
+
+
+register_model(_Fixed)(models.NestedArrayModel)
+
+
+def _read_only(world: np.dtype) -> types.Record:
+    record = from_dtype(world)
+    fields = []
+    for name, field in record.fields.items():
+        kind = field.type
+        if isinstance(kind, types.NestedArray):
+            kind = _Fixed(kind.dtype, kind.shape)
+        fields.append((name, {"type": kind, "offset": field.offset, "alignment": field.alignment}))
+    return types.Record(fields, record.size, record.aligned)
 
 
 def _compiled(made: Callable[..., Any], inlined: bool, *, cache: bool = False) -> Any:
@@ -303,7 +329,7 @@ def _engine() -> str:
     return digest.hexdigest()
 
 
-def _explained(text: Text, error: NumbaError) -> str:
+def _explained(text: Text, error: Exception) -> str:
     """One line of a compiler's message: where, what, and the way out."""
     message = re.sub(r"\x1b\[[0-9;]*m", "", str(error))
     files = {function.file for function in text.functions}
@@ -315,6 +341,10 @@ def _explained(text: Text, error: NumbaError) -> str:
     name = text.functions[-1].original.__name__
     where = f"{places[-1][0]}:{places[-1][1]}: {name}" if places else name
     raised = re.findall(r"(?:Typing|Value)Error: (.+)", message)  # by our own overloads, first
+    if isinstance(error, AttributeError) or "Cannot modify readonly" in message:
+        raised = [
+            "an array of the world is changed, which is the same for every run; change a copy"
+        ]
     telling = [*raised, *(line.strip() for line in message.splitlines() if _telling(line))]
     return (
         f"{where}: {telling[0] if telling else 'no native form'}; write it otherwise, or use "

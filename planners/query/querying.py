@@ -18,7 +18,7 @@ from planners.query import choosing, genetics
 from planners.query.background import Share, Worker
 from planners.query.choices import Address, Choices, Solution
 from planners.query.errors import NativeError
-from planners.query.memory import Memory
+from planners.query.memory import Memory, random_state
 from planners.query.models import Model
 from planners.query.operators import Operators
 from planners.query.reading import Text
@@ -114,7 +114,12 @@ class Query:
         return self._value(self._memory["best"])
 
     def step(self, generations: int = 1, until: float = -math.inf) -> int:
-        """Make some generations; fewer if the best value comes to `until`. How many were made."""
+        """Make some generations; fewer if the best value comes to `until`. How many were made.
+
+        Raises AnytimeError for a number of generations that is no integer.
+        """
+        if not is_number(generations) or generations != int(generations):
+            raise AnytimeError(f"generations is {generations!r}; give an integer")
         made = 0
         while made < generations:
             with self._gate:
@@ -178,6 +183,11 @@ class Query:
             raise AnytimeError(
                 "give seconds=…, evaluations=… or until=…: a query never ends itself"
             )
+        if self.generations == 0 and evaluations < self.size:
+            raise AnytimeError(
+                f"evaluations={evaluations}, but the first generation takes {self.size}; give as "
+                "many, or make the population smaller"
+            )
         deadline = Deadline.after(seconds)
         last = self.evaluations + evaluations
         while not deadline.expired() and (left := last - self.evaluations) >= self.size:
@@ -194,10 +204,10 @@ class Query:
         Raises AnytimeError for an address that the model never asked for.
         """
         with self._gate, self._lock:
-            fixed = [(self._cell(address), value) for address, value in choices.items()]
+            fixed = [(self._cell(at), _chosen(at, value)) for at, value in choices.items()]
             self._memory.blocks["fixed"][:] = np.nan
             for cell, value in fixed:
-                self._memory.blocks["fixed"][cell] = float(value)
+                self._memory.blocks["fixed"][cell] = value
             self._memory["constrained"] = int(bool(fixed))
 
     def suggest(self, choices: Mapping[Address, Any]) -> None:
@@ -286,12 +296,17 @@ class Query:
         return Solution(self._value(row), Choices(values, kinds))
 
     def _cell(self, address: Address) -> int:
-        source, index = address
-        *path, name = source.split("/") if source not in self._sources.kinds else [source]
+        try:
+            source, index = address
+            *path, name = source.split("/")
+        except (AttributeError, TypeError, ValueError):
+            raise AnytimeError(
+                f'{address!r} is no address; give (source, call), like ("walk", 0)'
+            ) from None
         kind = self._sources.kinds.get(name)
         known = kind is not None and len(path) % 2 == 0
         known = known and all(scope in self._sources.numbers for scope in path[::2])
-        known = known and all(place.isdecimal() for place in path[1::2])
+        known = known and all(place.isdecimal() and len(place) < 19 for place in path[1::2])
         if not known or not is_number(index) or index != int(index) or not 0 <= index < _LONGEST:
             asked = ", ".join(self._sources.kinds)
             raise AnytimeError(f"the model has no choice ({source!r}, {index}); it asks {asked}")
@@ -305,7 +320,7 @@ class Query:
         than any can be.
         """
         memory = self._memory
-        cells = {self._cell(address): float(value) for address, value in choices.items()}
+        cells = {self._cell(at): _chosen(at, value) for at, value in choices.items()}
         if constrained:
             fixed = memory.blocks["fixed"]
             cells |= {int(cell): float(fixed[cell]) for cell in np.flatnonzero(~np.isnan(fixed))}
@@ -349,7 +364,7 @@ def _memory(population: int, seed: int, operators: Operators) -> Memory:
     memory["main"] = population
     memory["kept"] = max(1, round(population // operators.islands * operators.elites))
     memory["scouts_kept"] = min(scouts, max(1, round(scouts * operators.elites)))
-    memory["random"] = seed % 2**64
+    memory["random"] = random_state(seed)
     memory["calm"] = 1.0
     for name in ("crossover", "line", "difference", "cloud", "pair", "structure", "immigrants"):
         memory[name] = getattr(operators, name)
@@ -359,6 +374,12 @@ def _memory(population: int, seed: int, operators: Operators) -> Memory:
     memory["restart"] = operators.restart
     memory["adaptive"], memory["dormant"] = int(operators.adaptive), int(operators.dormant)
     return memory
+
+
+def _chosen(address: Address, value: Any) -> float:
+    if not is_number(value) and not isinstance(value, bool | np.bool_):
+        raise AnytimeError(f"the choice {address!r} is {value!r}; give a number")
+    return float(value)
 
 
 def _typed(kind: str, value: float) -> Any:

@@ -10,7 +10,7 @@ import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -25,6 +25,9 @@ _BUILTINS = {"abs", "bool", "enumerate", "float", "len", "range", "zip"}
 _REBUILT = {"int", "max", "min", "round"}
 _SILENT = {"print", "breakpoint"}
 """Calls that the native form leaves out."""
+
+_SUMS = ("cumprod", "cumsum", "dot", "mean", "prod", "std", "sum", "trace", "var")
+"""Methods of arrays that add or multiply in another order natively."""
 
 _INSTEAD = {
     "hypot": "math.sqrt(x * x + y * y)",
@@ -105,6 +108,11 @@ def _read(
 
 
 def _parsed(function: Callable[..., Any]) -> tuple[ast.FunctionDef, str]:
+    if hasattr(function, "__wrapped__"):
+        raise NativeError(
+            f"{function.__name__} is decorated, and what its decorator does would be left out "
+            "natively; call what it does by name, or use Query(…, native=False)"
+        )
     try:
         lines, first = inspect.getsourcelines(function)
         file = inspect.getsourcefile(function) or "?"
@@ -172,19 +180,37 @@ class _Checker(ast.NodeTransformer):
         call = node.value
         called = call.func if isinstance(call, ast.Call) else None
         silent = isinstance(called, ast.Name) and called.id in _SILENT - self.local
+        if silent and any(map(self._may_choose, ast.walk(call))):
+            self._refuse(node, "a choice within what is left out natively", "make it before")
         if silent or isinstance(call, ast.Constant):
             return ast.copy_location(ast.Pass(), node)
         return self.generic_visit(node)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        if isinstance(node.op, ast.Pow):
-            self._refuse(node, "** rounds differently natively", f"write {_INSTEAD['pow']}")
-        return self.generic_visit(node)
+        return self._operation(node)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        return self._operation(node)
+
+    def _operation(self, node: ast.BinOp | ast.AugAssign) -> ast.AST:
         if isinstance(node.op, ast.Pow):
-            self._refuse(node, "**= rounds differently natively", f"write {_INSTEAD['pow']}")
+            self._refuse(node, "** rounds differently natively", f"write {_INSTEAD['pow']}")
+        if isinstance(node.op, ast.MatMult):
+            self._refuse(node, "@ adds in another order natively", "write a loop that adds")
+        if isinstance(node.op, ast.LShift | ast.RShift):
+            self._refuse(node, "a shift beyond 63 bits differs natively", "multiply or divide")
         return self.generic_visit(node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        if isinstance(node.op, ast.Invert):
+            self._refuse(node, "~ of a bool differs natively", "write not x, or -1 - x")
+        return self.generic_visit(node)
+
+    def visit_Set(self, node: ast.Set) -> ast.AST:
+        self._refuse(node, "the order of a set differs natively", "write a tuple")
+
+    def visit_SetComp(self, node: ast.SetComp) -> ast.AST:
+        self._refuse(node, "the order of a set differs natively", "write a list")
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         if node.value is None:
@@ -197,16 +223,17 @@ class _Checker(ast.NodeTransformer):
         method = called.attr if isinstance(called, ast.Attribute) else ""
         if method in (*KINDS, PATH) and not self._is_module(called.value):
             self._choice(node, method)
+        elif method in _SUMS and not self._is_module(called.value):
+            self._refuse(node, f".{method}() rounds differently natively", "write a loop that adds")
         return self.generic_visit(node)
 
-    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        of_world = any(isinstance(part, ast.Attribute) for part in ast.walk(node.value))
-        if isinstance(node.ctx, ast.Store) and of_world:
-            raise NativeError(
-                f"{self.file}:{node.lineno}: {self.name}: {ast.unparse(node)} is changed; the "
-                "world is the same for every run: change a copy"
-            )
-        return self.generic_visit(node)
+    def _may_choose(self, part: ast.AST) -> bool:
+        called: Any = part.func if isinstance(part, ast.Call) else None
+        if isinstance(called, ast.Attribute):
+            return called.attr in (*KINDS, PATH)
+        return (
+            isinstance(called, ast.Name) and plain_function(self.known.get(called.id)) is not None
+        )
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         if not self._is_module(node.value) or not isinstance(node.value, ast.Name):
@@ -296,6 +323,7 @@ class _Checker(ast.NodeTransformer):
                 f"the name in rng.{kind}(…) is computed",
                 'write it out, and number it by a path: rng.at("plan", i).' + f'{kind}("walk", …)',
             )
+        refuse_slash(value, f"{self.file}:{node.lineno}: ")
         if kind == PATH:
             self.paths.append(value)
             return
@@ -310,11 +338,17 @@ class _Checker(ast.NodeTransformer):
             and isinstance(self.known.get(node.id), ModuleType)
         )
 
-    def _refuse(self, node: ast.AST, what: str, way: str) -> None:
+    def _refuse(self, node: ast.AST, what: str, way: str) -> NoReturn:
         line = getattr(node, "lineno", "?")
         raise NativeError(
             f"{self.file}:{line}: {self.name}: {what}; {way}, or use Query(…, native=False)"
         )
+
+
+def refuse_slash(name: str, where: str = "") -> None:
+    """Raise ModelError for a name that addresses could not tell from a path."""
+    if "/" in name:
+        raise ModelError(f"{where}the name {name!r} holds a /, which parts the names of a path")
 
 
 def two_kinds(source: str, before: str, now: str, where: str = "") -> ModelError:

@@ -11,8 +11,8 @@ import numpy as np
 from planners.query import choosing, genetics
 from planners.query.choosing import KINDS
 from planners.query.errors import ModelError
-from planners.query.memory import Memory
-from planners.query.reading import Text, two_kinds
+from planners.query.memory import Memory, random_state
+from planners.query.reading import Text, refuse_slash, two_kinds
 
 
 class Sources:
@@ -35,7 +35,10 @@ class Sources:
 
     def number(self, name: str) -> int:
         """The number of a source or path name; a new one is written down."""
-        return self.numbers.setdefault(name, len(self.numbers))
+        if name not in self.numbers:
+            refuse_slash(name)
+            self.numbers[name] = len(self.numbers)
+        return self.numbers[name]
 
     def stream(self, path: int, name: str, kind: str) -> int:
         """The stream of a source below a path, or LOST while there is no room for it."""
@@ -50,7 +53,7 @@ class Sources:
 
     def locate(self, address: tuple[str, int], kind: str) -> int:
         """The cell of an address like ("plan/3/walk", 0); the tables grow if need be."""
-        *path, name = address[0].split("/") if address[0] not in self.kinds else [address[0]]
+        *path, name = address[0].split("/")
         while True:
             stream = self._descend(path, name, kind)
             cell = choosing.cell_of(self.memory.address, stream, address[1], KINDS.index(kind))
@@ -92,19 +95,21 @@ class Rng:
     `Rng(seed)` draws everything: `model(Rng(7), world)` is one random plan.
     """
 
-    __slots__ = ("_address", "_path", "_sources")
+    __slots__ = ("_address", "_alone", "_path", "_sources")
 
     def __init__(self, seed: int) -> None:
         memory = Memory(1, 8)
-        memory["random"] = seed % 2**64
+        memory["random"] = random_state(seed)
         genetics.breed(memory.address, 0)
         self._sources, self._address, self._path = Sources(memory), memory.address, -1
+        self._alone = True
 
     @classmethod
-    def of(cls, sources: Sources, path: int = -1) -> Rng:
-        """The one that a query's models get."""
+    def of(cls, sources: Sources, path: int = -1, *, alone: bool = False) -> Rng:
+        """The one that a query's models get; `alone`: without a query, which counts choices."""
         made = cls.__new__(cls)
         made._sources, made._address, made._path = sources, sources.memory.address, path
+        made._alone = alone
         return made
 
     def at(self, name: str, place: int = 0) -> Rng:
@@ -113,7 +118,7 @@ class Rng:
             raise ValueError("rng.at(name, place) was asked with a place < 0")
         number = self._sources.number(name)
         path = choosing.stream_of(self._address, self._path, number, index(place))
-        return Rng.of(self._sources, path)
+        return Rng.of(self._sources, path, alone=self._alone)
 
     def flip(self, source: str, p: float = 0.5) -> bool:
         """True with probability p."""
@@ -149,6 +154,8 @@ class Rng:
         return choosing.lognormal(self._address, stream, float(mean), float(sigma))
 
     def _stream(self, source: str, kind: str) -> int:
+        if self._alone:  # there are no runs here, whose choices would be too many
+            self._sources.memory["length"] = 0
         if self._path == -1 and self._sources.kinds.get(source) == kind:
             known = self._sources.at_root.get(source)
             if known is not None:

@@ -116,6 +116,8 @@ def _array(name: str, value: Any) -> np.ndarray:
         array = np.array(None)
     if array.dtype.kind == "b" and array.ndim == 0:
         return array
+    if array.dtype.kind == "u" and array.size and int(array.max()) > np.iinfo(np.int64).max:
+        raise AnytimeError(f"world[{name!r}] is {value!r}; integers have 64 bits, with a sign")
     if array.dtype.kind in "biu":  # native records hold no arrays of bools: they become 0 and 1
         return array.astype(np.int64)
     if array.dtype.kind == "f":

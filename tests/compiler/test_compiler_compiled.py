@@ -206,10 +206,23 @@ def test_a_result_that_takes_no_time_is_compiled_too():
     compiled = compiler.compile(
         instant, anytime.measure(instant, problems(), seconds=1, clock=clock)
     )
-    assert compiled.least == 0
-    assert compiled.promise(0) == pytest.approx(0.4)
+    assert compiled.least == 1e-9  # a call without time is not run
+    assert compiled.promise(0) == 0
+    assert compiled.promise(1e-9) == pytest.approx(0.4)
     assert max(map(len, repr(compiled).splitlines())) <= 100
     assert "<svg" in compiled._repr_html_()
+
+
+@pytest.mark.parametrize("free_one", ["see", "find"])
+def test_a_module_that_costs_nothing_gets_as_much_time_as_it_takes_to_be_run(free_one):
+    machine = anytime.Machine("m")
+    for name in ("see", "find"):
+        machine = machine.with_rate(name, 0.0 if name == free_one else 0.001)
+    free_clock = lambda: anytime.WorkClock(machine)  # noqa: E731
+    library = anytime.measure(navigate, problems(), seconds=1, clock=free_clock)
+    schedule = compiler.compile(navigate, library)
+    for seconds in schedule.frontier.budgets[1:]:
+        assert schedule.run(float(seconds), clock=free_clock(), **ALL).value is not None
 
 
 # Running

@@ -9,7 +9,7 @@ import pytest
 
 from anytime import AnytimeError
 from planners import query
-from planners.query import Query, native
+from planners.query import Query, choosing, native
 
 
 @query.model
@@ -44,6 +44,37 @@ def way_out(rng, w):
 def careless(rng, w):
     w.a[0] += rng.gaussian("x")
     return w.a[0]
+
+
+@query.model
+def aliased(rng, w):
+    a = w.a
+    a[0] += rng.gaussian("x")
+    return a[0]
+
+
+@query.model
+def visited(rng, w):
+    for row in w.grid:
+        row[0] += rng.gaussian("x")
+    return w.grid[0, 0]
+
+
+def _change(numbers, by):
+    numbers[0] += by
+
+
+@query.model
+def lent(rng, w):
+    _change(w.a, rng.gaussian("x"))
+    return w.a[0]
+
+
+@query.model
+def grown(rng, w):
+    a = w.a
+    a += rng.gaussian("x")
+    return a[0]
 
 
 @query.model
@@ -147,9 +178,12 @@ def test_a_world_may_hold_flags_alone_and_in_arrays(is_native):
 
 
 def test_a_model_changes_no_world():
-    world = {"a": np.array([1.0, 2.0, 3.0])}
-    with pytest.raises(AnytimeError, match=r"w\.a\[0\] is changed; .*change a copy"):
-        Query(careless, world, seed=1)
+    world = {"a": np.array([1.0, 2.0, 3.0]), "grid": np.eye(3)}
+    for changing in (careless, aliased, visited, lent, grown):
+        with pytest.raises(AnytimeError, match=r"world is changed, .*change a copy"):
+            Query(changing, world, seed=1)
+        with pytest.raises(ValueError, match="read-only"):
+            Query(changing, world, seed=1, native=False).step()
     searched = Query(careful, world, seed=1)
     searched.step(5)
     assert searched.world["a"][0] == 1.0
@@ -217,3 +251,58 @@ def test_constants_of_another_shape_or_type_are_other_code():
     ones = np.ones(4)
     marks = {native._bytes(each) for each in (ones, ones.reshape(2, 2), ones.view(np.int64))}
     assert len(marks) == 3
+
+
+@query.model
+def drawn(rng):
+    return rng.at("leg", rng.randint("which", 3)).gaussian("x") + rng.uniform("y")
+
+
+def test_a_model_is_run_alone_as_often_as_one_likes():
+    rng, length = query.Rng(7), choosing.RUNAWAY // 3
+    rng._sources.memory["length"] = 3 * length
+    assert len({drawn(rng) for _ in range(100)}) == 100
+
+
+@pytest.mark.parametrize("seed", [None, "a", 1.5, math.nan])
+def test_a_seed_is_an_integer(seed):
+    for begin in (query.Rng, lambda seed: Query(drawn, seed=seed)):
+        with pytest.raises(AnytimeError, match="give an integer"):
+            begin(seed)
+
+
+def test_a_seed_may_be_an_integer_of_numpy():
+    assert drawn(query.Rng(np.int64(3))) == drawn(query.Rng(3))
+
+
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"n": 1.0},
+        {(3, 0): 1.0},
+        {("leg/99999999999999999999/x", 0): 1.0},
+        {("y", 0): "1"},
+        {("y", 0): None},
+    ],
+)
+def test_what_is_no_choice_is_refused_and_changes_nothing(choices):
+    searched = Query(drawn, seed=1, population=8)
+    searched.step()
+    searched.constrain({("y", 0): 0.5})
+    for ask in (searched.constrain, searched.suggest, searched.value_of):
+        with pytest.raises(AnytimeError):
+            ask(choices)
+    searched.step(3)
+    assert searched.best.choices["y", 0] == 0.5
+
+
+def test_too_few_evaluations_for_a_generation_are_refused_by_name():
+    with pytest.raises(AnytimeError, match="the first generation takes"):
+        Query(drawn, seed=1).run(evaluations=10)
+    with pytest.raises(AnytimeError, match="give an integer"):
+        Query(drawn, seed=1).step(2.5)
+
+
+def test_integers_of_a_world_have_64_bits():
+    with pytest.raises(AnytimeError, match="64 bits"):
+        Query(way_out, {"open": 2**63, "free": [1, 0, 0, 0]}, seed=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import subprocess
 import sys
@@ -124,6 +125,55 @@ def worldly(rng):
 SETTINGS = {"a": 1}
 
 
+def doubled(function):
+    @functools.wraps(function)
+    def inner(x):
+        return 2.0 * function(x)
+
+    return inner
+
+
+@doubled
+def decorated(x):
+    return abs(x)
+
+
+@query.model
+def helped(rng):
+    return decorated(rng.gaussian("x"))
+
+
+@query.model
+def told(rng):
+    print(rng.gaussian("x"))  # a choice that is printed
+    return abs(rng.gaussian("x"))
+
+
+@query.model
+def unordered(rng):
+    total = 0
+    for i in {30, 1, 17}:  # a set
+        total = total * 3 + i
+    return total + rng.gaussian("x")
+
+
+@query.model
+def shifted(rng):
+    return 1 << rng.randint("n", 4)  # a shift
+
+
+@query.model
+def inverted(rng):
+    return ~rng.flip("b")  # an inversion
+
+
+@query.model
+def added(rng):
+    values = np.zeros(40)
+    values[0] = rng.gaussian("x")
+    return values.sum()  # a sum of an array
+
+
 @pytest.mark.parametrize(
     ("model", "says", "at"),
     [
@@ -135,6 +185,12 @@ SETTINGS = {"a": 1}
         (recursive, "again calls itself", None),
         (nested, "a function within the function", "# a function within"),
         (worldly, "put it into the world", "# a dictionary"),
+        (helped, "decorated is decorated", None),
+        (told, "make it before", "# a choice that is printed"),
+        (unordered, "write a tuple", "# a set"),
+        (shifted, "multiply or divide", "# a shift"),
+        (inverted, "not x", "# an inversion"),
+        (added, "a loop that adds", "# a sum of an array"),
     ],
 )
 def test_what_has_no_native_form_is_refused_with_the_line_and_the_way_out(model, says, at):
@@ -149,7 +205,8 @@ def test_what_has_no_native_form_is_refused_with_the_line_and_the_way_out(model,
 
 
 def test_a_refused_model_may_stay_plain():
-    for model in (computed, looped, far, powerful, summing, nested, worldly):
+    refused = (computed, looped, far, powerful, summing, nested, worldly)
+    for model in (*refused, helped, told, unordered, shifted, inverted, added):
         searched = Query(model, native=False, population=8)
         searched.step(2)
         assert searched.model.replay(searched.best.choices) == searched.value
@@ -171,6 +228,27 @@ def test_a_source_of_two_distributions_is_refused_natively_and_plain():
 @query.model
 def mistyped(rng):
     return rng.randint("n", 2.5)
+
+
+@query.model
+def slashed(rng):
+    return rng.gaussian("a/0/b") + rng.at("a", 0).gaussian("b")
+
+
+def test_a_name_that_could_be_a_path_is_refused_natively_and_plain():
+    for native in (True, False):
+        with pytest.raises(ModelError, match="holds a /"):
+            Query(slashed, native=native, population=8).step(1)
+
+
+@query.model
+def misplaced(rng):
+    return rng.at("a", 2.5).gaussian("x")
+
+
+def test_a_place_is_an_integer():
+    with pytest.raises(NativeError, match="takes an integer place"):
+        Query(misplaced)
 
 
 def test_what_the_compiler_refuses_is_told_in_one_line():
