@@ -84,7 +84,7 @@ def flat(grid: NDArray[Any], name: str) -> NDArray[np.uint8]:
     """View a bool or uint8 map [rows, columns] as flat bytes, without a copy where it can."""
     if not isinstance(grid, np.ndarray):  # pyright: ignore[reportUnnecessaryIsInstance]
         raise AnytimeError(f"{name} is a {type(grid).__name__}; give an array [rows, columns]")
-    if grid.ndim != 2 or not grid.size or grid.dtype not in (np.bool_, np.uint8):
+    if grid.ndim != 2 or not grid.size or grid.dtype.char not in "?B":  # bool or uint8
         raise AnytimeError(
             f"{name} is {grid.dtype} {list(grid.shape)}, it must be bool or uint8 [rows, columns]"
         )
@@ -97,7 +97,7 @@ def flat(grid: NDArray[Any], name: str) -> NDArray[np.uint8]:
 def flat_free(free: NDArray[Any], name: str) -> NDArray[np.uint8]:
     """`flat` of a map of free cells, whose bytes searches read as bits: 0 and 1 alone."""
     cells = flat(free, name)
-    if free.dtype != np.bool_ and int(cells.max()) > 1:
+    if free.dtype.char != "?" and int(cells.max()) > 1:
         raise AnytimeError(
             f"{name} holds {int(cells.max())}: give bools, True where a cell is free, as in "
             "`picture > 0`"
