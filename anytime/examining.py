@@ -15,6 +15,7 @@ from anytime.pictures import duration
 CONTRACT = 0.01  # seconds of an empty loop to a deadline
 LOOPS = 20_000  # turns of the loop whose speed is taken
 UNSTEADY = 1.5  # times its median that the loop takes at the 95th percentile
+BUSY = 0.75  # processes a core above which others take a share, however steadily
 LATE = 0.005  # seconds past its deadline at the 99th percentile, above which the machine is noisy
 
 
@@ -40,7 +41,8 @@ class Examination:
     @property
     def quiet(self) -> bool:
         """Whether profiles may be measured here in real time."""
-        return self.late_p99 <= LATE and self.unsteady <= UNSTEADY
+        free = self.load is None or self.load <= BUSY
+        return free and self.late_p99 <= LATE and self.unsteady <= UNSTEADY
 
     def __repr__(self) -> str:
         load = "" if self.load is None else f", {self.load:.1f} processes want each"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import anytime
-from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock
+from anytime import AnytimeError, Machine, ProfileLibrary, WorkClock, examining
 from anytime.calibrating import PROBLEMS, calibrate
 from compiler import program
 
@@ -108,6 +108,15 @@ def test_problems_that_the_library_does_not_know_are_refused(library):
         calibrate(library, both, strange)
     with pytest.raises(AnytimeError, match="no profile for module 'look'"):
         calibrate(ProfileLibrary(), both, problems())
+
+
+def test_a_machine_is_quiet_when_nothing_is_late_unsteady_or_busy():
+    quiet = examining.Examination(2, 0.2, 5e7, 1.1, 1e-6, 1e-5, 1e-4, ())
+    assert quiet.quiet
+    assert replace(quiet, load=None).quiet
+    assert not replace(quiet, load=1.0).quiet
+    assert not replace(quiet, unsteady=2.0).quiet
+    assert not replace(quiet, late_p99=0.01).quiet
 
 
 def test_the_doctor_says_how_fast_and_how_quiet_this_machine_is(capsys):
