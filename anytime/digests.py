@@ -38,12 +38,23 @@ def _content(value: Any) -> bytes:
         return _joined([kind, *sorted(map(_content, cast("set[Any]", value)))])
     if type(value) in (list, tuple):
         return _joined([kind, *map(_content, cast("list[Any]", value))])
-    content = io.BytesIO()
     try:
-        _Pickler(content, protocol=5).dump(value)
-        return content.getvalue()
+        try:
+            return _pickled(value, remembering=False)
+        except ValueError:  # it holds itself
+            return _pickled(value, remembering=True)
     except Exception as error:  # whatever the value's own methods raise
         raise TypeError(f"{type(value).__name__} cannot be pickled: {error}") from error
+
+
+def _pickled(value: Any, *, remembering: bool) -> bytes:
+    """remembering: whether what comes a second time is written as such, so that two equal objects
+    in a value and one object twice are not the same."""
+    content = io.BytesIO()
+    pickler = _Pickler(content, protocol=5)
+    pickler.fast = not remembering
+    pickler.dump(value)
+    return content.getvalue()
 
 
 class _Pickler(pickle.Pickler):

@@ -57,6 +57,7 @@ def test_a_value_of_a_script_has_the_same_digest_where_the_script_is_imported(tm
     ("one", "other"),
     [
         (["ab", "ab"], ["ab", "".join(["a", "b"])]),
+        (SimpleNamespace(a="ab", b="ab"), SimpleNamespace(a="ab", b="".join(["a", "b"]))),
         (np.asfortranarray(np.eye(3)), np.eye(3)),
         ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
     ],
@@ -80,6 +81,13 @@ def test_equal_values_have_equal_digests(one, other):
 def test_other_values_have_other_digests(one, other):
     assert digest_of(one) != digest_of(other)
     assert digest_of(one, other) != digest_of(other, one)
+
+
+def test_what_holds_itself_has_a_digest():
+    here, there = SimpleNamespace(at=1), SimpleNamespace(at=2)
+    here.next, there.next = here, there
+    assert digest_of(here) == digest_of(here)
+    assert digest_of(here) != digest_of(there)
 
 
 def test_what_cannot_be_pickled_is_named():
