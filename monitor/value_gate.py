@@ -27,6 +27,10 @@ SPEEDS = 91  # on a coarser grid, what is rounded is as large as what is looked 
 LEAST = 1e-6  # of the task's worth: a smaller loss is the arithmetic's
 
 
+class UnreachedError(AnytimeError):
+    """No mission reached its goal, so that nothing can be foreseen from those lived."""
+
+
 @dataclass(frozen=True)
 class Gate:
     """What a change costs, with its 95 % interval.
@@ -52,6 +56,14 @@ class Gate:
     def shown(self) -> bool:
         """Whether a loss beyond the tolerance is shown: the whole interval lies above it."""
         return self.low > self.tolerance
+
+    def backwards(self, shifts: Mapping[str, Shift]) -> Gate:
+        """The same found of the change the other way round, whose shifts are these."""
+        parts = {name: -loss for name, loss in self.parts.items()}
+        return Gate(
+            self.mission, self.after, self.before, -self.high, -self.low, self.tolerance, shifts,
+            parts,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         verdict = "no loss is shown"
@@ -146,7 +158,7 @@ class Foresight:
         kept = [_without(steady, out) for steady in self.lived]
         lived = rhythm_from(kept)
         if lived is None:
-            raise AnytimeError(
+            raise UnreachedError(
                 f"no mission of {self.mission.name!r} reached its goal, so none can be foreseen"
             )
         there = self._seen(lived.sensing)

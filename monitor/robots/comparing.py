@@ -16,7 +16,7 @@ from monitor.robots.grid_missions import GridMission
 from monitor.robots.lessons import NO_MEMORY, Memory
 from monitor.robots.navigation import navigate
 from monitor.shifts import GROUPS, shifts_of_libraries, shifts_of_schedules
-from monitor.value_gate import Foresight, Gate, gate
+from monitor.value_gate import Foresight, Gate, UnreachedError, gate
 from planners.navigation import find_path
 from sensing.vision import see
 
@@ -31,9 +31,10 @@ def compare(
     """What a change costs in the value of a mission.
 
     before, after: folders of profiles, or files that `anytime compile` wrote. tolerance: the loss
-    of net value that is put up with. memory: where what the missions lived teach is kept.
-    Raises AnytimeError for a path that is not there, for two of different kinds, and for programs
-    of other modules.
+    of net value that is put up with. memory: where what the missions lived teach is kept. Missions
+    are lived with what was before; where none of them reaches its goal, with what came after.
+    Raises AnytimeError if no mission reaches its goal with either, for a path that is not there,
+    for two of different kinds, and for programs of other modules.
     """
     grid = replace(grid, mission=grid.mission.known(0.0))  # judged as it is presented
     for path in (before, after):
@@ -46,12 +47,24 @@ def compare(
         )
     if before.is_dir():
         libraries = ProfileLibrary(before), ProfileLibrary(after)
-        shifts = shifts_of_libraries(navigate, *libraries)  # refuses before anything is lived
-        grid = replace(grid, machine=as_before(grid.machine, libraries[0].machine))
-        return gate(foreseen(brief(grid, libraries[0], effort(grid), memory)), shifts, tolerance)
-    old, new = (_schedule(path, grid) for path in (before, after))
-    shifts = shifts_of_schedules(old, new)
-    return gate(foreseen(brief_with(old, grid, effort(grid), memory)), shifts, tolerance)
+        shifts, back = (
+            shifts_of_libraries(navigate, *pair) for pair in (libraries, libraries[::-1])
+        )
+
+        def lived(side: int) -> Briefing:
+            known = replace(grid, machine=as_before(grid.machine, libraries[side].machine))
+            return brief(known, libraries[side], effort(grid), memory)
+    else:
+        schedules = _schedule(before, grid), _schedule(after, grid)
+        shifts, back = (shifts_of_schedules(*pair) for pair in (schedules, schedules[::-1]))
+
+        def lived(side: int) -> Briefing:
+            return brief_with(schedules[side], grid, effort(grid), memory)
+
+    try:
+        return gate(foreseen(lived(0)), shifts, tolerance)
+    except UnreachedError:  # with what it was before; a change that mends that is told as well
+        return gate(foreseen(lived(1)), back, tolerance).backwards(shifts.all)
 
 
 def as_before(machine: Machine, before: Machine) -> Machine:

@@ -14,11 +14,14 @@ from experiments import shipped
 from monitor import Energy, Mission, Value
 from monitor.calibration import Steady
 from monitor.rhythms import Lived
-from monitor.robots.comparing import as_before
+from monitor.robots.comparing import as_before, compare
+from monitor.robots.grid import Scene
+from monitor.robots.grid_missions import GridMission
 from monitor.robots.navigation import navigate
 from monitor.shifts import GROUPS, Shift, Shifts
 from monitor.states import Situation
 from monitor.value_gate import Foresight, gate
+from sensing import Vision
 
 MISSION = Mission(Value("linear", 100.0, 90.0), Energy(0.2, 0.08, 0.03), job=1.0, name="ward")
 ROUTE, FRAMES = 100.0, 10
@@ -68,6 +71,36 @@ def test_a_loss_is_shown_if_it_is_clear_of_the_noise_and_beyond_the_tolerance(fo
     assert not gate(foresight, noisy).shown
     assert not gate(foresight, clear, tolerance=found.high).shown
     assert found.parts["see"] == pytest.approx(found.loss)
+
+
+def test_a_change_the_other_way_round_wins_what_was_lost(foresight):
+    slow = {"see": Shift(2.0)}
+    found = gate(foresight, Shifts(slow, [slow] * GROUPS))
+    won = found.backwards({"see": Shift(0.5)})
+    assert (won.before, won.after, won.loss) == (found.after, found.before, -found.loss)
+    assert won.low < won.loss < won.high
+    assert not won.shown
+    assert won.backwards(slow) == found
+
+
+def test_a_change_that_mends_what_reached_no_goal_is_no_loss(tmp_path):
+    free = np.ones((24, 24), bool)
+    free[6:18, 12] = False
+    grid = GridMission(
+        replace(MISSION, value=Value("hard", 100.0, 30.0)),
+        Scene(free, (12, 2), (12, 21), device=Vision(2, 12)),
+        shipped.profiles().machine,
+    )
+    good = shipped.profiles()
+    good.save(tmp_path / "good")
+    good.on(good.machine.with_rate("find_path", 5.0)).save(tmp_path / "bad")
+    mended = compare(tmp_path / "bad", tmp_path / "good", grid)
+    spoiled = compare(tmp_path / "good", tmp_path / "bad", grid)
+    assert spoiled.shown
+    assert not mended.shown
+    assert (mended.before, mended.after) == (spoiled.after, spoiled.before)
+    assert (mended.low, mended.high) == (-spoiled.high, -spoiled.low)
+    assert mended.shifts["find_path"].slower == pytest.approx(1 / 5000)
 
 
 def test_the_command_refuses_what_cannot_be_compared_in_one_line(tmp_path, capsys):
