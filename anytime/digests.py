@@ -38,33 +38,25 @@ def _content(value: Any) -> bytes:
         return _joined([kind, *sorted(map(_content, cast("set[Any]", value)))])
     if type(value) in (list, tuple):
         return _joined([kind, *map(_content, cast("list[Any]", value))])
+    content = io.BytesIO()
     try:
-        try:
-            return _pickled(value, remembering=False)
-        except ValueError:  # it holds itself
-            return _pickled(value, remembering=True)
+        _Pickler(content, protocol=5).dump(value)
+        return content.getvalue()
     except Exception as error:  # whatever the value's own methods raise
         raise TypeError(f"{type(value).__name__} cannot be pickled: {error}") from error
 
 
-def _pickled(value: Any, *, remembering: bool) -> bytes:
-    """remembering: whether what comes a second time is written as such, so that two equal objects
-    in a value and one object twice are not the same."""
-    content = io.BytesIO()
-    pickler = _Pickler(content, protocol=5)
-    pickler.fast = not remembering
-    pickler.dump(value)
-    return content.getvalue()
-
-
 class _Pickler(pickle.Pickler):
     """Writes what pickle would write differently in another process: sets, whose order differs, by
-    what they hold; classes and functions of a script, whose module is `__main__` or named after its
+    what they hold; strings likewise, for pickle refers back to one that it has met, but not to an
+    equal one; classes and functions of a script, whose module is `__main__` or named after its
     file, by their own names."""
 
     def persistent_id(self, obj: Any) -> bytes | None:
         if type(obj) in (set, frozenset):
             return _content(obj)
+        if type(obj) is str:
+            return b"str " + obj.encode("utf-8", "surrogatepass")
         if isinstance(obj, type | FunctionType) and _is_script(obj.__module__):
             # What is made within a function has no name of its own, and cannot be pickled.
             return None if "<" in obj.__qualname__ else obj.__qualname__.encode()

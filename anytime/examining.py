@@ -80,7 +80,7 @@ def examine(seconds: float = 2.0) -> Examination:
     cores = cores or 1
     return Examination(
         cores=cores,
-        load=os.getloadavg()[0] / cores if hasattr(os, "getloadavg") else None,
+        load=os.getloadavg()[0] / (os.cpu_count() or 1) if hasattr(os, "getloadavg") else None,
         turns=LOOPS / median,
         unsteady=float(np.quantile(loops, 0.95)) / median,
         late_p50=p50,

@@ -124,12 +124,12 @@ def line_chart(
         colour = COLOURS[index % len(COLOURS)]
         dash = ' stroke-dasharray="5 4"' if label in dashed else ""
         pieces = groupby(zip(x, y, strict=True), lambda point: not math.isnan(point[1]))
-        line = "".join(
-            "M" + "L".join(place(*at) for at in piece) for known, piece in pieces if known
-        )
+        drawn = [[place(*at) for at in piece] for known, piece in pieces if known]
+        # A point alone is drawn as a line to itself, with round ends.
+        line = "".join("M" + "L".join(piece * 2 if len(piece) < 2 else piece) for piece in drawn)
         parts.append(
             f'<path class="line" d="{line}" fill="none" stroke="{colour}" '
-            f'stroke-width="1.8"{dash}/>'
+            f'stroke-width="1.8" stroke-linecap="round"{dash}/>'
         )
         if len(series) > 1:
             legend = top + 14 + 14 * index

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
 from anytime.profiles import Profile
+from compiler.tables import SHORTEST
 
 Floats = NDArray[np.float64]
 POINTS = 96  # lengths of a contract that are considered, at most
-SHORTEST = 1e-9  # seconds; a contract of no time at all is not run
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 LEVELS = 16  # of an intermediate result, besides "no result"
 TIMES = 96  # moments of a module at which its time may end
 JOINT = 8192  # combinations of input levels of one node, at most
-_AT_ONCE = 1e-9  # seconds: the least that is kept apart from none when shares are added
+SHORTEST = 1e-9  # seconds: a call, or a contract, of no time at all is not run
 KNOWN = np.array([0.0, 1.0])  # levels of an input that a test is: it is there and right
 
 
@@ -241,14 +241,14 @@ def _moments(profile: Profile) -> Floats:
 def _given_time(times: Floats, qualities: Floats) -> tuple[Floats, Floats]:
     """Moments and qualities [runs, moments] with nothing at 0: a call without time is not run.
 
-    What is there at once, as of a module that costs nothing on a work clock, needs `_AT_ONCE`.
+    What is there at once, as of a module that costs nothing on a work clock, needs `SHORTEST`.
     """
-    soon = int(np.searchsorted(times, _AT_ONCE, side="right")) - 1  # the last of those moments
+    soon = int(np.searchsorted(times, SHORTEST, side="right")) - 1  # the last of those moments
     if np.isnan(qualities[:, soon]).all():
         return times, qualities
     nothing = np.full((len(qualities), 1), np.nan)
     return (
-        np.concatenate([[0.0, _AT_ONCE], times[soon + 1 :]]),
+        np.concatenate([[0.0, SHORTEST], times[soon + 1 :]]),
         np.concatenate([nothing, qualities[:, soon:]], axis=1),
     )
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Callable
 from typing import Any
 
-from anytime.clocks import Clock
+from anytime.clocks import INSTANT, Clock
 from anytime.pictures import number
 from anytime.results import Change
 from compiler.policies import Share
@@ -41,7 +41,7 @@ class Watch:
         """Whether the call is to end here; the event of its deadline."""
         if self.ended is None:
             elapsed = self._clock.now() - self._started
-            moment = max(0, bisect_right(self._moments, elapsed + 1e-9) - 1)
+            moment = max(0, bisect_right(self._moments, elapsed + INSTANT) - 1)
             if self._ends[moment][self._level]:
                 self.ended = elapsed
         return self.ended is not None
@@ -49,7 +49,7 @@ class Watch:
     @property
     def why(self) -> str:
         """Why the call was ended before the end of its share; empty where it was not."""
-        if self.ended is None or self.ended >= self._share.seconds - 1e-9:
+        if self.ended is None or self.ended >= self._share.seconds - INSTANT:
             return ""
         showed = "nothing" if self.shown is None else number(self.shown)
         return f" (ended by what it showed, {showed})"

@@ -77,15 +77,20 @@ def waterfall(log: Log) -> list[Step]:
     steps: list[Step] = []
     left = worth = log.mission.worth(0.0)
     steps.append(Step("worth", 0.0, worth, sum=True))
-    told = any(loss.news for loss in losses)
-    for name in ("drive", "wait", "news") if told else ("drive", "wait"):
-        lost = sum(getattr(loss, name) for loss in losses)
-        steps.append(Step(name, left, left - lost))
-        left -= lost
     end = log.end
     finished = log.frames[-1].ended if log.frames else 0.0
+    at_last = log.mission.told(finished, end.seconds) if end is not None else 0.0
+    lost = {
+        "drive": sum(loss.drive for loss in losses),
+        "wait": sum(loss.wait for loss in losses),
+        "news": sum(loss.news for loss in losses) - at_last,
+    }
+    for name, amount in lost.items():
+        if name != "news" or amount:
+            steps.append(Step(name, left, left - amount))
+            left -= amount
     if end is not None:
-        job = log.mission.worth(finished) - log.mission.worth(end.seconds)
+        job = log.mission.worth(finished) - log.mission.worth(end.seconds) + at_last
         if job > 0:
             steps.append(Step("job", left, left - job))
             left -= job

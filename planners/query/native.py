@@ -123,7 +123,7 @@ def _number(rng, source):
 def _at(rng, name, place=0):
     number = _number(rng, name)
     place = getattr(place, "value", place)  # of one that was left out
-    if not isinstance(place, int | types.Integer | types.IntegerLiteral):
+    if not isinstance(place, int | types.Integer | types.IntegerLiteral | types.Boolean):
         raise TypingError(f"at(name, place) takes an integer place, not {place}")
 
     def at(rng, name, place=0):
@@ -234,7 +234,7 @@ def make(text: Text, world: np.dtype, takes_world: bool) -> Native:
     dispatcher = built[id(text.functions[-1].original)]
     try:
         dispatcher.compile(types.float64(rng, *[_read_only(world)] * takes_world))
-    except (NumbaError, AttributeError) as error:  # numba has the latter for += on what is fixed
+    except (NumbaError, AttributeError, AssertionError) as error:  # numba's own, of what is fixed
         raise NativeError(_explained(text, error)) from error
     compiled = next(iter(dispatcher.overloads.values()))
     address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
@@ -254,7 +254,7 @@ register_model(_Fixed)(models.NestedArrayModel)
 
 
 def _read_only(world: np.dtype) -> types.Record:
-    record = from_dtype(world)
+    record: Any = from_dtype(world)
     fields = []
     for name, field in record.fields.items():
         kind = field.type
@@ -341,9 +341,10 @@ def _explained(text: Text, error: Exception) -> str:
     name = text.functions[-1].original.__name__
     where = f"{places[-1][0]}:{places[-1][1]}: {name}" if places else name
     raised = re.findall(r"(?:Typing|Value)Error: (.+)", message)  # by our own overloads, first
-    if isinstance(error, AttributeError) or "Cannot modify readonly" in message:
+    if not isinstance(error, NumbaError) or "Cannot modify readonly" in message:
         raised = [
-            "an array of the world is changed, which is the same for every run; change a copy"
+            "an array that is the same for every run, as those of the world are, is changed or "
+            "replaced; begin with a copy"
         ]
     telling = [*raised, *(line.strip() for line in message.splitlines() if _telling(line))]
     return (

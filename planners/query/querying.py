@@ -118,7 +118,7 @@ class Query:
 
         Raises AnytimeError for a number of generations that is no integer.
         """
-        if not is_number(generations) or generations != int(generations):
+        if not is_number(generations) or generations % 1 != 0:
             raise AnytimeError(f"generations is {generations!r}; give an integer")
         made = 0
         while made < generations:

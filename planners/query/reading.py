@@ -26,6 +26,7 @@ _REBUILT = {"int", "max", "min", "round"}
 _SILENT = {"print", "breakpoint"}
 """Calls that the native form leaves out."""
 
+_CHANGES = ("append", "clear", "extend", "fill", "insert", "pop", "remove", "reverse", "sort")
 _SUMS = ("cumprod", "cumsum", "dot", "mean", "prod", "std", "sum", "trace", "var")
 """Methods of arrays that add or multiply in another order natively."""
 
@@ -99,6 +100,8 @@ def _read(
     tree, file = _parsed(function)
     known = _names(function)
     checker = _Checker(function.__name__, file, known, sources, paths)
+    if not callers:
+        checker.choosing.add(function.__code__.co_varnames[0])
     tree = checker.visit(tree)
     for called in checker.calls.values():
         _read(called, functions, sources, paths, (*callers, id(function)))
@@ -166,6 +169,7 @@ class _Checker(ast.NodeTransformer):
         self.calls: dict[str, Callable[..., Any]] = {}
         self.modules: dict[str, ModuleType] = {}
         self.local: set[str] = set()
+        self.choosing = {"rng"}  # names by which choices are made
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         if self.local:
@@ -174,14 +178,18 @@ class _Checker(ast.NodeTransformer):
             *(a.arg for a in [*node.args.args, *node.args.kwonlyargs]),
             *(n.id for n in ast.walk(node) if isinstance(n, ast.Name) and _stored(n)),
         }
+        for part in ast.walk(node):
+            if isinstance(part, ast.Attribute) and part.attr in (*KINDS, PATH):
+                self.choosing |= {n.id for n in ast.walk(part) if isinstance(n, ast.Name)}
         return self.generic_visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST:
         call = node.value
         called = call.func if isinstance(call, ast.Call) else None
         silent = isinstance(called, ast.Name) and called.id in _SILENT - self.local
-        if silent and any(map(self._may_choose, ast.walk(call))):
-            self._refuse(node, "a choice within what is left out natively", "make it before")
+        if silent and any(map(self._does_something, ast.walk(call))):
+            what = "a choice or a change within what is left out natively"
+            self._refuse(node, what, "make it before")
         if silent or isinstance(call, ast.Constant):
             return ast.copy_location(ast.Pass(), node)
         return self.generic_visit(node)
@@ -225,17 +233,21 @@ class _Checker(ast.NodeTransformer):
             self._choice(node, method)
         elif method in _SUMS and not self._is_module(called.value):
             self._refuse(node, f".{method}() rounds differently natively", "write a loop that adds")
+        elif method == "argsort" and not self._is_module(called.value):
+            self._refuse(node, ".argsort() orders what is equal differently", "write a loop")
         return self.generic_visit(node)
 
-    def _may_choose(self, part: ast.AST) -> bool:
-        called: Any = part.func if isinstance(part, ast.Call) else None
-        if isinstance(called, ast.Attribute):
-            return called.attr in (*KINDS, PATH)
-        return (
-            isinstance(called, ast.Name) and plain_function(self.known.get(called.id)) is not None
-        )
+    def _does_something(self, part: ast.AST) -> bool:
+        if isinstance(part, ast.Name):
+            return part.id in self.choosing
+        changes = isinstance(part, ast.Attribute) and part.attr in _CHANGES
+        return changes or isinstance(part, ast.NamedExpr)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        if node.attr == "flat" and not self._is_module(node.value):
+            self._refuse(
+                node, "what is changed by .flat is not noticed natively", "index the array"
+            )
         if not self._is_module(node.value) or not isinstance(node.value, ast.Name):
             return self.generic_visit(node)
         module, name = self.known[node.value.id], node.attr

@@ -117,7 +117,7 @@ class Rng:
         if place < 0:
             raise ValueError("rng.at(name, place) was asked with a place < 0")
         number = self._sources.number(name)
-        path = choosing.stream_of(self._address, self._path, number, index(place))
+        path = choosing.stream_of(self._address, self._path, number, int(index(place)))
         return Rng.of(self._sources, path, alone=self._alone)
 
     def flip(self, source: str, p: float = 0.5) -> bool:
@@ -172,7 +172,7 @@ class Replay:
         self._counts: dict[str, int] = {} if counts is None else counts
 
     def at(self, name: str, place: int = 0) -> Replay:
-        return Replay(self._choices, f"{self._path}{name}/{place}/", self._counts)
+        return Replay(self._choices, f"{self._path}{name}/{int(place)}/", self._counts)
 
     def _take(self, source: str, *parameters: Any) -> Any:
         name = self._path + source

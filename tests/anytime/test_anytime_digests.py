@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import dataclass
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -88,6 +89,21 @@ def test_what_holds_itself_has_a_digest():
     here.next, there.next = here, there
     assert digest_of(here) == digest_of(here)
     assert digest_of(here) != digest_of(there)
+
+
+@dataclass(slots=True)
+class Door:
+    other: object = None
+
+
+def test_what_is_shared_or_goes_in_a_circle_is_written_once():
+    tower = [1.0]
+    for _ in range(60):
+        tower = SimpleNamespace(left=tower, right=tower)
+    assert len(digest_of(tower)) == 16
+    one, other = Door(), Door()
+    one.other, other.other = other, one
+    assert digest_of(one) == digest_of(other)
 
 
 def test_what_cannot_be_pickled_is_named():

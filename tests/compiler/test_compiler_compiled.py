@@ -225,6 +225,31 @@ def test_a_module_that_costs_nothing_gets_as_much_time_as_it_takes_to_be_run(fre
         assert schedule.run(float(seconds), clock=free_clock(), **ALL).value is not None
 
 
+def test_an_adaptive_program_gives_a_module_that_costs_nothing_its_turn():
+    machine = MACHINE.with_rate("last", 0.0)
+    free_clock = lambda: anytime.WorkClock(machine)  # noqa: E731
+
+    @anytime.module(quality=lambda value: value, estimate=lambda value: value)
+    def last(path):
+        yield path
+
+    @anytime.module(quality=lambda value: value, estimate=lambda value: value, name="see")
+    def look(image):
+        for step in range(1, 5):
+            anytime.charge(10 * step)
+            yield image * step / 4
+
+    @compiler.program
+    def shown(image, goal):
+        return last(find(look(image), goal))
+
+    library = anytime.measure(shown, problems(), seconds=1, clock=free_clock)
+    adaptive = compiler.compile(shown, library, adaptive=True)
+    for seconds in np.linspace(0.06, 0.3, 25):
+        result = adaptive.run(float(seconds), clock=free_clock(), **ALL)
+        assert (result.value is None) == (adaptive.promise(float(seconds)) == 0.0)
+
+
 # Running
 
 

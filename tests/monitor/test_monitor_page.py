@@ -69,13 +69,15 @@ def test_the_waterfall_adds_up(logs):
 
 
 def test_what_became_known_on_the_way_is_not_put_down_to_driving(tmp_path, mission, floor, report):
-    at, worth = 0.5 * report.frames[-1].ended, float(mission.value.worth)
-    told = replace(mission, news=News(at, Value("linear", 2.0 * worth, mission.value.seconds)))
-    log = read_log(write_log(tmp_path / "a.jsonl", told, floor, report))
-    steps = {step.name: step for step in waterfall(log)}
-    assert steps["news"].size == pytest.approx(told.news.value(at) - told.value(at))
-    assert steps["drive"].size <= 0.0
-    assert steps["wait"].size <= 0.0
+    worth, last = float(mission.value.worth), report.frames[-1].ended
+    late = replace(report, seconds=last + 1.0)  # of a job after the last frame
+    for at, lived in ((last + 0.5, late), (0.5 * last, report)):
+        told = replace(mission, news=News(at, Value("linear", 2.0 * worth, mission.value.seconds)))
+        log = read_log(write_log(tmp_path / f"{at}.jsonl", told, floor, lived))
+        steps = {step.name: step for step in waterfall(log)}
+        assert steps["news"].size == pytest.approx(told.news.value(at) - told.value(at))
+        assert steps["drive"].size <= 0.0
+        assert steps["wait"].size <= 0.0
     losses = page_data([log])["runs"][0]["losses"]
     assert "What became known on the way added" in losses
 

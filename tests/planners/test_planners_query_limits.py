@@ -180,7 +180,7 @@ def test_a_world_may_hold_flags_alone_and_in_arrays(is_native):
 def test_a_model_changes_no_world():
     world = {"a": np.array([1.0, 2.0, 3.0]), "grid": np.eye(3)}
     for changing in (careless, aliased, visited, lent, grown):
-        with pytest.raises(AnytimeError, match=r"world is changed, .*change a copy"):
+        with pytest.raises(AnytimeError, match=r"as those of the world are, .*begin with a copy"):
             Query(changing, world, seed=1)
         with pytest.raises(ValueError, match="read-only"):
             Query(changing, world, seed=1, native=False).step()

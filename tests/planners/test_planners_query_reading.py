@@ -150,6 +150,25 @@ def told(rng):
 
 
 @query.model
+def popped(rng):
+    values = [rng.gaussian("x"), 1.0]
+    print(values.pop())  # a change that is printed
+    return values[0]
+
+
+def _described(x):
+    return x * 2.0
+
+
+@query.model
+def described(rng):
+    x = rng.gaussian("x")
+    print(_described(x), f"{x:.3f}")
+    leg = rng.at("leg", rng.flip("second"))
+    return leg.gaussian("y") + x
+
+
+@query.model
 def unordered(rng):
     total = 0
     for i in {30, 1, 17}:  # a set
@@ -187,6 +206,7 @@ def added(rng):
         (worldly, "put it into the world", "# a dictionary"),
         (helped, "decorated is decorated", None),
         (told, "make it before", "# a choice that is printed"),
+        (popped, "make it before", "# a change that is printed"),
         (unordered, "write a tuple", "# a set"),
         (shifted, "multiply or divide", "# a shift"),
         (inverted, "not x", "# an inversion"),
@@ -228,6 +248,12 @@ def test_a_source_of_two_distributions_is_refused_natively_and_plain():
 @query.model
 def mistyped(rng):
     return rng.randint("n", 2.5)
+
+
+def test_prints_that_do_nothing_else_are_left_out_and_a_place_may_be_a_flip():
+    searched = Query(described, population=8, seed=1)
+    searched.step(3)
+    assert described.replay(searched.best.choices) == searched.value
 
 
 @query.model
