@@ -48,15 +48,12 @@ def _content(value: Any) -> bytes:
 
 class _Pickler(pickle.Pickler):
     """Writes what pickle would write differently in another process: sets, whose order differs, by
-    what they hold; strings likewise, for pickle refers back to one that it has met, but not to an
-    equal one; classes and functions of a script, whose module is `__main__` or named after its
+    what they hold; classes and functions of a script, whose module is `__main__` or named after its
     file, by their own names."""
 
     def persistent_id(self, obj: Any) -> bytes | None:
         if type(obj) in (set, frozenset):
             return _content(obj)
-        if type(obj) is str:
-            return b"str " + obj.encode("utf-8", "surrogatepass")
         if isinstance(obj, type | FunctionType) and _is_script(obj.__module__):
             # What is made within a function has no name of its own, and cannot be pickled.
             return None if "<" in obj.__qualname__ else obj.__qualname__.encode()

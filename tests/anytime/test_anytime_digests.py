@@ -58,7 +58,6 @@ def test_a_value_of_a_script_has_the_same_digest_where_the_script_is_imported(tm
     ("one", "other"),
     [
         (["ab", "ab"], ["ab", "".join(["a", "b"])]),
-        (SimpleNamespace(a="ab", b="ab"), SimpleNamespace(a="ab", b="".join(["a", "b"]))),
         (np.asfortranarray(np.eye(3)), np.eye(3)),
         ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
     ],
