@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from anytime.errors import AnytimeError
 from anytime.files import write_atomically
 from anytime.pictures import duration, number
 from monitor.log_lines import FrameLine, Log, MomentLine
@@ -72,6 +73,8 @@ def write_page(
 
 def page_data(logs: Sequence[Log], names: Sequence[str] = ()) -> dict[str, Any]:
     """What the page draws, as plain data: numbers, and the sentences made of them."""
+    if names and len(names) != len(logs):
+        raise AnytimeError(f"{len(names)} names for {len(logs)} missions; give each a name")
     runs = [_run(log, _fixed(log, logs)) for log in logs]
     for run, name in zip(runs, names or _names(logs), strict=True):
         run["name"] = name

@@ -180,7 +180,7 @@ class _Checker(ast.NodeTransformer):
         }
         for part in ast.walk(node):
             if isinstance(part, ast.Attribute) and part.attr in (*KINDS, PATH):
-                self.choosing |= {n.id for n in ast.walk(part) if isinstance(n, ast.Name)}
+                self.choosing |= self._asked(part)
         return self.generic_visit(node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST:
@@ -236,6 +236,14 @@ class _Checker(ast.NodeTransformer):
         elif method == "argsort" and not self._is_module(called.value):
             self._refuse(node, ".argsort() orders what is equal differently", "write a loop")
         return self.generic_visit(node)
+
+    def _asked(self, method: ast.expr) -> set[str]:
+        """The name that a method like rng.at("leg", i).gaussian is asked of."""
+        while isinstance(method, ast.Attribute | ast.Call):
+            method = method.value if isinstance(method, ast.Attribute) else method.func
+        return (
+            {method.id} if isinstance(method, ast.Name) and not self._is_module(method) else set()
+        )
 
     def _does_something(self, part: ast.AST) -> bool:
         if isinstance(part, ast.Name):

@@ -36,17 +36,18 @@ class Sources:
     def number(self, name: str) -> int:
         """The number of a source or path name; a new one is written down."""
         if name not in self.numbers:
+            if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
+                raise ModelError(f"the name of a source or a path is {name!r}; give a string")
             refuse_slash(name)
             self.numbers[name] = len(self.numbers)
         return self.numbers[name]
 
     def stream(self, path: int, name: str, kind: str) -> int:
         """The stream of a source below a path, or LOST while there is no room for it."""
-        if not isinstance(name, str):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise ModelError(f"the name of a source is {name!r}; give a string")
+        number = self.number(name)
         if self.kinds.setdefault(name, kind) != kind:
             raise two_kinds(name, self.kinds[name], kind)
-        found = choosing.stream_of(self.memory.address, path, self.number(name), -1)
+        found = choosing.stream_of(self.memory.address, path, number, -1)
         if path == -1 and found >= 0:
             self.at_root[name] = found
         return found

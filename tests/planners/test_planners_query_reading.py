@@ -164,6 +164,9 @@ def _described(x):
 def described(rng):
     x = rng.gaussian("x")
     print(_described(x), f"{x:.3f}")
+    for i in range(2):
+        x += rng.at("step", i).gaussian("y")
+        print(i)
     leg = rng.at("leg", rng.flip("second"))
     return leg.gaussian("y") + x
 
