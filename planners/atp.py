@@ -39,8 +39,10 @@ _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
 _REGION_PERCENT = 112  # of the straight line: what search over regions expects over 128 cells …
 _PERCENT_DOUBLED = 6  # … and how much more for every doubling, for pins err less over many regions
 _TAXI = 1.2  # … and how many times as much without diagonals
-_FIRST, _SCALES = 1.08, (1.01, 0.995)
-"""By what the norm of independent obstacles is multiplied, search by search …"""
+_THIN, _DENSE = (0.1, 1.15), (0.2, 1.08)
+"""By what the first search multiplies the norm of independent obstacles up to one density and from
+another on: where they are few, a way that was found in haste is hardly longer …"""
+_SCALES = (1.01, 0.995)  # … and the next ones do
 _TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
 _WIDE = 0.1  # and where it expands so much of the distance's square, the next finds no less to do
 _WINDOWS = (8, 16, 32, 64)  # cells of the windows, pass by pass …
@@ -84,6 +86,11 @@ def steps(
         _runs.put_back(grid.shape, run)
 
 
+def _first_scale(density: float) -> float:
+    (thin, hasty), (dense, careful) = _THIN, _DENSE
+    return hasty + (careful - hasty) * min(max((density - thin) / (dense - thin), 0.0), 1.0)
+
+
 _runs = Pool(improving.new_run)
 _region_runs = Pool(region_search.new_region_run)
 
@@ -115,10 +122,10 @@ class _Query:
             yield from self.search(budget=_SMALL_BUDGET)
             if self.done:
                 return
-        _, clustering, looked = self.grid.features
+        density, clustering, looked = self.grid.features
         yield looked / blocks.EXPANDED
         if clustering < _CLUSTERED:
-            yield from self.search(_FIRST, patience=_PATIENCE * far)
+            yield from self.search(_first_scale(density), patience=_PATIENCE * far)
             for scale in _SCALES:
                 if self.done or math.isinf(self.cost):
                     break
@@ -135,7 +142,7 @@ class _Query:
             if not self.done:
                 yield from self.over_regions()
             if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
-                yield from self.search(_FIRST, patience=_PATIENCE * far)
+                yield from self.search(_first_scale(density), patience=_PATIENCE * far)
             if self.done:
                 return
             yield from self.learn()
