@@ -42,6 +42,7 @@ _TAXI = 1.2  # … and how many times as much without diagonals
 _THIN, _DENSE = (0.1, 1.15), (0.2, 1.08)
 """By what the first search multiplies the norm of independent obstacles up to one density and from
 another on: where they are few, a way that was found in haste is hardly longer …"""
+_FAR = 256  # … over so many cells: nearer, to make it better takes longer than haste has saved …
 _SCALES = (1.01, 0.995)  # … and the next ones do
 _TRUSTED = 0.985  # … but where it expects less than so much of the way in hand, it is mistaken
 _WIDE = 0.1  # and where it expands so much of the distance's square, the next finds no less to do
@@ -86,8 +87,10 @@ def steps(
         _runs.put_back(grid.shape, run)
 
 
-def _first_scale(density: float) -> float:
+def _first_scale(density: float, far: int) -> float:
     (thin, hasty), (dense, careful) = _THIN, _DENSE
+    if far < _FAR:
+        return careful
     return hasty + (careful - hasty) * min(max((density - thin) / (dense - thin), 0.0), 1.0)
 
 
@@ -125,7 +128,7 @@ class _Query:
         density, clustering, looked = self.grid.features
         yield looked / blocks.EXPANDED
         if clustering < _CLUSTERED:
-            yield from self.search(_first_scale(density), patience=_PATIENCE * far)
+            yield from self.search(_first_scale(density, far), patience=_PATIENCE * far)
             for scale in _SCALES:
                 if self.done or math.isinf(self.cost):
                     break
@@ -142,7 +145,7 @@ class _Query:
             if not self.done:
                 yield from self.over_regions()
             if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
-                yield from self.search(_first_scale(density), patience=_PATIENCE * far)
+                yield from self.search(_first_scale(density, far), patience=_PATIENCE * far)
             if self.done:
                 return
             yield from self.learn()
