@@ -21,7 +21,7 @@ import anytime
 from planners import blocks, improving, region_search, tracing, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
-from planners.improving import COUNT, CURRENT, DONE, GAIN, MEETING, SHIFT, UPPER, Run
+from planners.improving import COUNT, DONE, MEETING, NOTHING, UPPER, Run
 from planners.landmarks import known_way
 from planners.multipath import NO_WAY, MultiPath, Step, way_plan
 from planners.norms import expected_norm, least_norm
@@ -84,6 +84,7 @@ def steps(
         if math.isinf(best):
             yield Step(0.0, NO_WAY)
     finally:
+        run.state[COUNT], run.state[MEETING] = 0, NOTHING
         _runs.put_back(grid.shape, run)
 
 
@@ -114,7 +115,6 @@ class _Query:
         self.least: float = int(least_way(self.down, self.across, diagonals))
         self.cost: float = math.inf
         self.coarse = 0.0
-        run.state[COUNT], run.state[MEETING] = 0, -1
         self._map = (grid.cost, grid.wall, columns)
         self._soft = (grid.cost, grid.wall, grid.dearest, columns)
 
@@ -172,7 +172,7 @@ class _Query:
 
         Where such a search gets stuck, for so many expansions, its norm was too small.
         """
-        state, known = self.run.state, not math.isinf(self.cost)
+        known = not math.isinf(self.cost)
         if scale is not None and known:
             self._expect(1.0)
             expected = int(improving.estimated(self.down, self.across, self.run.norm))
@@ -181,16 +181,17 @@ class _Query:
         density = 0.0 if scale is None else self.grid.features[0]
         upper = int(self.cost) if known else SPAN
         grain = GRAIN if known else _FIRST_GRAIN
-        found, taken = way_in_hand.set_out(*query, min(grain, budget), upper, density, scale or 0.0)
+        found, taken, cost, low = way_in_hand.set_out(
+            *query, min(grain, budget), upper, density, scale or 0.0
+        )
         left = patience
         while True:
             budget -= taken
             left -= taken
-            if (reached := int(state[UPPER] - state[GAIN])) < SPAN:
-                self.cost = reached
+            if cost < SPAN:
+                self.cost = int(cost)
             if scale is None:
-                low = int(state[CURRENT]) << int(state[SHIFT])
-                self.least = self.cost if found == DONE else max(self.least, low)
+                self.least = self.cost if found == DONE else max(self.least, int(low))
             elif found == OUT_OF_BUDGET and left < 0:
                 scale, left = 1.25 * scale, patience
                 self._expect(scale)
@@ -198,10 +199,10 @@ class _Query:
             yield float(taken)
             if found == DONE or budget <= 0:
                 break
-            found, taken = way_in_hand.go_on(*query, min(grain, budget))
-        if found == OUT_OF_BUDGET and state[MEETING] >= 0:
+            found, taken, cost, low = way_in_hand.go_on(*query, min(grain, budget))
+        if found == OUT_OF_BUDGET and self.run.state[MEETING] >= 0:
             way_in_hand.take_up(*self._map, self.start, self.diagonals, self.run)
-            self.cost = int(state[UPPER])
+            self.cost = int(self.run.state[UPPER])
 
     def _expect(self, scale: float | None) -> None:
         if scale is None:
@@ -283,7 +284,7 @@ class _Query:
             done, taken = way_in_hand.improve_windows(
                 *self._map, length, self.diagonals, self.run, GRAIN
             )
-            state[MEETING] = -1
+            state[MEETING] = NOTHING
             self._weigh()
             yield float(taken)
 
@@ -293,12 +294,11 @@ class _Query:
 
     def plan(self) -> MultiPath:
         """The best way so far, as a plan without any abstraction."""
-        way = self.run.path[: self.run.state[COUNT]]
-        if self.run.state[MEETING] >= 0:
-            # Labels that were corrected since may have made it even shorter than was told.
-            way, cost = way_in_hand.so_far(*self._map, self.start, self.diagonals, self.run)
-            self.cost = int(cost)
-        return way_plan(way, self.grid.shape[1], self.cost, self.least)
+        cells, diagonal, cost = way_in_hand.so_far(
+            *self._map, self.start, self.diagonals, self.run, int(self.cost)
+        )
+        self.cost = int(cost)
+        return way_plan(cells, diagonal, self.cost, self.least)
 
 
 def features_of(domain, start: Cell, goal: Cell) -> dict[str, float]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from planners.frontier import NOT_FIRST, NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "d52e87379353"
+CALLED = "a8b7af0524ff"
 
 SIDE, MOST = 8, 32
 UNKNOWN = 255

@@ -16,7 +16,7 @@ from numba import njit
 
 from planners.search import CLOSED, DIAGONAL, LAST, SPAN, STRAIGHT
 
-CALLED = "faffbc721331"
+CALLED = "525505352c65"
 
 ONE, SIDE_BITS, EVERY = np.uint64(1), np.uint64(8), ~np.uint64(0)
 NOT_FIRST = ~np.uint64(0x0101010101010101)

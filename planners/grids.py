@@ -16,7 +16,7 @@ from planners.path_finding import Cell, flat_free, index_of
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "5e5b4e953834"
+CALLED = "d5c58ce725d1"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much
@@ -67,6 +67,8 @@ class Grid:
         self.wall = wall
         self.shape: tuple[int, int] = (shape[0], shape[1])
         self.changes = 0  # so many updates
+        # Not a cached property, whose lock takes a tenth of the time of a first plan.
+        self._features: tuple[float, float, int] | None = None
 
     @property
     def dearest(self) -> int:
@@ -83,10 +85,12 @@ class Grid:
         """What later queries have found out about distances so far."""
         return Landmarks(*self.shape)
 
-    @cached_property
+    @property
     def features(self) -> tuple[float, float, int]:
         """(density of what is blocked, its clustering, cells looked at): see `map_features`."""
-        return features(self.cost, self.wall, self.dearest, self.shape[1], _SAMPLE)
+        if self._features is None:
+            self._features = features(self.cost, self.wall, self.dearest, self.shape[1], _SAMPLE)
+        return self._features
 
     def update(self, top: int, left: int, domain: NDArray[np.floating]) -> None:
         """Take in new probabilities of a rectangle [height, width] with that upper left cell.
@@ -158,7 +162,7 @@ def endpoints(grid: Grid, start: Cell, goal: Cell, connectivity: int) -> tuple[i
     ends: list[int] = []
     for cell, name in ((start, "start"), (goal, "goal")):
         index = index_of(cell, grid.shape, name)
-        if grid.cost[index] == grid.wall:
+        if grid.cost.item(index) == grid.wall:
             raise AnytimeError(
                 f"{name} cell ({cell[0]}, {cell[1]}) is blocked for certain, choose a free cell"
             )

@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from planners.arrays import zeroed
 from planners.search import (
     ACROSS,
     DIAGONAL,
@@ -25,7 +26,7 @@ from planners.search import (
     WALL,
 )
 
-CALLED = "faffbc721331"
+CALLED = "525505352c65"
 
 DONE = 0
 BUCKETS = 1 << 13
@@ -67,15 +68,20 @@ class Run(NamedTuple):
 def new_run(rows: int, columns: int) -> Run:
     """Arrays for a map of that size."""
     cells = rows * columns
-    return Run(
-        label=np.zeros(cells, np.int64),
-        prefix=np.zeros(cells, np.int64),
-        bucket=np.full(BUCKETS, NOTHING, np.int32),
-        entry=np.zeros((_ENTRIES * cells, 2), np.int32),
-        norm=np.zeros(6, np.int64),
-        path=np.zeros(cells + 1, np.int32),
-        state=np.zeros(16, np.int64),
+    run = Run(
+        **zeroed(
+            label=(cells, np.int64),
+            prefix=(cells, np.int64),
+            bucket=(BUCKETS, np.int32),
+            entry=((_ENTRIES * cells, 2), np.int32),
+            norm=(6, np.int64),
+            path=(cells + 1, np.int32),
+            state=(16, np.int64),
+        )
     )
+    run.bucket[:] = NOTHING
+    run.state[MEETING] = NOTHING
+    return run
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

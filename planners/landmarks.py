@@ -33,7 +33,7 @@ from planners.region_search import (
 from planners.search import OUT_OF_BUDGET, SPAN
 from planners.tracing import connect, pins_along
 
-CALLED = "fcc2972463f3"
+CALLED = "3bd6eb6aa000"
 
 _EVERYWHERE = -2  # the goal's region of a search that goes on until it has been everywhere
 _GRAIN = 1000 * EXPANDED  # work of such a search between two steps …

@@ -6,7 +6,7 @@ from numba import njit
 from planners.blocks import ALL, FIRST_COLUMN, LAST_ROW, SIDE, pack
 from planners.frontier import NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "5e00bb66c1a0"
+CALLED = "447ebd89fb83"
 
 _TWOS, _FOURS = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
 _EIGHTS = np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -32,11 +32,11 @@ def features(cost, wall, dearest, columns, most):
     high, wide = (rows + SIDE - 1) // SIDE, (columns + SIDE - 1) // SIDE
     stride = max(1, int(np.ceil(np.sqrt(high * wide / most))))
     cells, blocked, pairs, both = 0, 0, 0, 0
-    for one in range(0, high, stride):
-        for other in range(0, wide, stride):
+    for one in range((high + stride - 1) // stride):
+        for other in range((wide + stride - 1) // stride):
             # Moved about, or walls at even distances would lie in all of them or in none.
-            row = one + 3 * (other // stride) % stride
-            column = other + 5 * (one // stride) % stride
+            row = one * stride + 3 * other % stride
+            column = other * stride + 5 * one % stride
             if row >= high or column >= wide:
                 continue
             tall, broad = min(SIDE, rows - row * SIDE), min(SIDE, columns - column * SIDE)

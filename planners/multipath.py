@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.frontier import cells_of
 from planners.search import DIAGONAL, STRAIGHT
 
 
@@ -78,17 +77,17 @@ class Step:
     plan: MultiPath | None
 
 
-def way_plan(path: NDArray[np.int32], columns: int, cost: float, least: float) -> MultiPath:
+def way_plan(plan: NDArray[np.int32], diagonal: int, cost: float, least: float) -> MultiPath:
     """A plan without any abstraction: a way from cell to cell.
 
-    `path` is flat indices int32 [n] into a map of so many columns. `cost` is what the search says
-    of it (10 000 a straight step over a cell of cost 1), `least` a proven lower bound of that.
-    Where believed obstacles are crossed, `length` counts them as what they cost.
+    `plan` is int32 [n, 3] of (0, row, column), with so many diagonal steps: see
+    `frontier.cells_of`. `cost` is what the search says of it (10 000 a straight step over a cell of
+    cost 1), `least` a proven lower bound of that. Where believed obstacles are crossed, `length`
+    counts them as what they cost.
     """
-    plan, diagonal = cells_of(path, columns, 1)
     # Counted rather than summed, so that equal ways have equal lengths to the last bit.
     diagonal = int(diagonal)  # numba leaves it an int, plain numpy an int64
-    straight = max(len(path) - 1, 0) - diagonal
+    straight = max(len(plan) - 1, 0) - diagonal
     length = straight + diagonal * math.sqrt(2)
     dear = cost - (straight * STRAIGHT + diagonal * DIAGONAL)
     if dear > 0:

@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "c529a3bb7b09"
+CALLED = "d3b5951e77ea"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

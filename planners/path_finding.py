@@ -88,10 +88,10 @@ def flat(grid: NDArray[Any], name: str) -> NDArray[np.uint8]:
         raise AnytimeError(
             f"{name} is {grid.dtype} {list(grid.shape)}, it must be bool or uint8 [rows, columns]"
         )
-    cells = np.ascontiguousarray(grid)
+    flags = grid.flags
     # For arrays that may not be written numba would compile every kernel once more.
-    cells = cells if cells.flags.writeable else cells.copy()
-    return cells.view(np.uint8).reshape(-1)
+    cells = grid if flags.c_contiguous and flags.writeable else grid.copy()
+    return np.frombuffer(cells, np.uint8)
 
 
 def flat_free(free: NDArray[Any], name: str) -> NDArray[np.uint8]:

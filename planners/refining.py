@@ -10,7 +10,7 @@ from planners.frontier import octile, path_to, with_room
 from planners.search import WALL
 from planners.windows import ENDLESS, IMPASSABLE, YES, ZERO, window_search
 
-CALLED = "6b53d4a0489a"
+CALLED = "3937f6faed97"
 
 # A plan in refinement. A segment is a row of `segment`; its cells lie in `cell`, flat indices on
 # its own level; segments meet in joints, each as fine as the finest segment that it bounds.

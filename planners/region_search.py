@@ -16,11 +16,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from planners.arrays import zeroed
 from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region_of
 from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "5e00bb66c1a0"
+CALLED = "447ebd89fb83"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9
@@ -58,20 +59,24 @@ class RegionRun(NamedTuple):
 def new_region_run(rows: int, columns: int) -> RegionRun:
     """Arrays for a map of that size."""
     regions = -(-rows // SIDE) * -(-columns // SIDE) * MOST
-    return RegionRun(
-        clock=np.zeros(1, np.int64),
-        label=np.zeros(regions, np.int64),
-        bucket=np.full(BUCKETS, NOTHING, np.int32),
-        # Two blocks share at most 8 cells of a border, so this many joins at most.
-        entry=np.zeros(regions + 1, np.int32),
-        behind=np.zeros(regions + 1, np.int32),
-        pin=np.zeros(regions, np.int32),
-        parent=np.zeros(regions, np.int32),
-        door=np.zeros(regions, np.int32),
-        bend=np.zeros(regions, np.int32),
-        cheapest=np.zeros(regions, np.int64),
-        state=np.zeros(8, np.int64),
+    run = RegionRun(
+        **zeroed(
+            clock=(1, np.int64),
+            label=(regions, np.int64),
+            bucket=(BUCKETS, np.int32),
+            # Two blocks share at most 8 cells of a border, so this many joins at most.
+            entry=(regions + 1, np.int32),
+            behind=(regions + 1, np.int32),
+            pin=(regions, np.int32),
+            parent=(regions, np.int32),
+            door=(regions, np.int32),
+            bend=(regions, np.int32),
+            cheapest=(regions, np.int64),
+            state=(8, np.int64),
+        )
     )
+    run.bucket[:] = NOTHING
+    return run
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

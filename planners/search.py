@@ -17,6 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from planners.arrays import zeroed
+
 STRAIGHT, DIAGONAL = 10_000, 14_142
 WALL = 255
 SPAN = 1 << 44
@@ -101,14 +103,16 @@ def workspace(cells: int) -> Workspace:
         return kept
     # Zeroed pages are only committed when touched, so a small query on a large map costs nothing.
     _kept.workspace = Workspace(
-        clock=np.zeros(1, np.int64),
-        label=np.zeros(cells, np.int64),
-        key=np.zeros(cells, np.int64),
-        heap=np.zeros(cells, np.int32),
-        slot=np.zeros(cells, np.int32),
-        entry=np.zeros(ENTRIES * cells, np.int32),
-        behind=np.zeros(ENTRIES * cells, np.int32),
-        bucket=np.zeros(BUCKETS, np.int32),
+        **zeroed(
+            clock=(1, np.int64),
+            label=(cells, np.int64),
+            key=(cells, np.int64),
+            heap=(cells, np.int32),
+            slot=(cells, np.int32),
+            entry=(ENTRIES * cells, np.int32),
+            behind=(ENTRIES * cells, np.int32),
+            bucket=(BUCKETS, np.int32),
+        )
     )
     return _kept.workspace
 

@@ -3,10 +3,11 @@
 import numpy as np
 from numba import njit
 
-from planners.frontier import step_cost, way_cost, with_room
+from planners.frontier import cells_of, step_cost, way_cost, with_room
 from planners.improving import (
     BASE,
     COUNT,
+    CURRENT,
     DONE,
     FOLLOWS,
     GAIN,
@@ -14,6 +15,7 @@ from planners.improving import (
     MEETING,
     NOTHING,
     POSITION,
+    SHIFT,
     SIDE,
     UPPER,
     begin,
@@ -23,7 +25,7 @@ from planners.improving import (
 from planners.norms import expected_norm, least_norm
 from planners.search import ACROSS, DIAGONAL, DOWN, SPAN, STEP, STRAIGHT
 
-CALLED = "24660e8435b5"
+CALLED = "5f752b2b38cb"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
@@ -68,20 +70,26 @@ def way_to(cost, wall, columns, start, node, diagonals, run):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def so_far(cost, wall, columns, start, diagonals, run):
-    """The way as a search that has beaten it, and still goes on, has made it shorter so far: flat
-    indices, and its cost."""
+def so_far(cost, wall, columns, start, diagonals, run, known):
+    """The way in hand, known to cost so much, or what a search that has beaten it, and still goes
+    on, has made of it so far: its cells as `cells_of` a plan, and its cost."""
     count, node, path = run.state[COUNT], run.state[MEETING], run.path
+    if node < 0:
+        cells, diagonal = cells_of(path[:count], columns, 1)
+        return cells, diagonal, known
+    # Labels that were corrected since may have made it even shorter than was told.
     beginning, length = way_to(cost, wall, columns, start, node, diagonals, run)
     if count == 0 or node == path[count - 1]:
-        return beginning, length
+        cells, diagonal = cells_of(beginning, columns, 1)
+        return cells, diagonal, length
     rest = count - 1  # its last visit, should the way go in a circle
     while path[rest] != node:
         rest -= 1
     way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
     for place in range(rest + 1, count):
         way[beginning.size + place - rest - 1] = path[place]
-    return way, length + _left(run, node)
+    cells, diagonal = cells_of(way, columns, 1)
+    return cells, diagonal, length + _left(run, node)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -146,11 +154,15 @@ def set_out(cost, wall, columns, start, goal, diagonals, run, budget, upper, den
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def go_on(cost, wall, columns, start, goal, diagonals, run, budget):
-    """Go on with a search as `improving.search` does, and when it is done take up what it found."""
+    """Go on with a search as `improving.search` does, and when it is done take up what it found.
+
+    Returns besides what the way costs now, and what any other costs at least if the norm is exact.
+    """
     found, taken = search(cost, wall, columns, goal, diagonals, run, budget)
-    if found == DONE and run.state[MEETING] >= 0:
+    state = run.state
+    if found == DONE and state[MEETING] >= 0:
         take_up(cost, wall, columns, start, diagonals, run)
-    return found, taken
+    return found, taken, state[UPPER] - state[GAIN], state[CURRENT] << state[SHIFT]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners import Grid, ara, paper_atp, steps
+from planners.frontier import cells_of
 from planners.grids import endpoints
 from planners.improving import DONE, GAIN, MEETING, UPPER, begin, new_run, search
 from planners.multipath import NO_WAY, Step, way_plan
@@ -46,7 +47,7 @@ def _weighted(grid: Grid, start: Cell, goal: Cell, weights: tuple[float, ...]) -
             if found == DONE and run.state[MEETING] >= 0:
                 known = float(run.state[UPPER] - run.state[GAIN])
                 way, _ = way_to(grid.cost, grid.wall, columns, first, last, True, run)
-                plan = way_plan(way, columns, known, known / weight)
+                plan = way_plan(*cells_of(way, columns, 1), known, known / weight)
             yield Step(float(taken), plan)
     if known == SPAN:
         yield Step(0.0, NO_WAY)
