@@ -77,6 +77,10 @@ class Step:
     plan: MultiPath | None
 
 
+_FREE = np.zeros(1)  # the obstacleness of every way
+_FREE.flags.writeable = False
+
+
 def way_plan(plan: NDArray[np.int32], diagonal: int, cost: float, least: float) -> MultiPath:
     """A plan without any abstraction: a way from cell to cell.
 
@@ -93,7 +97,7 @@ def way_plan(plan: NDArray[np.int32], diagonal: int, cost: float, least: float) 
     if dear > 0:
         length += dear / STRAIGHT
     bound = min(1.0, least / cost) if cost > 0 else 1.0
-    return MultiPath(plan, np.array([0, len(plan)], np.int32), np.zeros(1), length, bound * length)
+    return MultiPath(plan, np.array([0, len(plan)], np.int32), _FREE, length, bound * length)
 
 
 NO_WAY = MultiPath(np.empty((0, 3), np.int32), np.zeros(1, np.int32), np.zeros(0), math.inf, 0.0)
