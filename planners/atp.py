@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import anytime
-from planners import blocks, improving, region_search, tracing, way_in_hand
+from planners import blocks, coarse_way, improving, region_search, way_in_hand
 from planners.frontier import least_way, way_cost
 from planners.grids import Grid, endpoints
 from planners.improving import COUNT, DONE, MEETING, NOTHING, UPPER, Run
@@ -212,10 +212,13 @@ class _Query:
 
     def over_known_regions(self) -> Iterator[float]:
         """A first way by what earlier queries have found out about distances, if they have."""
-        grid, path, before = self.grid, self.run.path, self._in_hand()
+        grid = self.grid
+        if not grid.landmarks.known:
+            return
+        before = self._in_hand()
         count, cost, work = known_way(
             *self._soft, self.start, self.goal, self.diagonals, grid.regions,
-            grid.landmarks.tables, path,
+            grid.landmarks.tables, self.run.path,
         )  # fmt: skip
         if count:
             self._choose(int(count), int(cost), before)
@@ -223,54 +226,44 @@ class _Query:
 
     def over_regions(self) -> Iterator[float]:
         """A first way over the graph of regions, or a better one."""
-        grid, run, soft = self.grid, _region_runs.take(self.grid.shape), self._soft
-        distances = grid.landmarks.tables.far
+        grid, run, before = self.grid, _region_runs.take(self.grid.shape), self._in_hand()
         far = max(abs(self.down), abs(self.across))
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         if not self.diagonals:
             percent = round(_TAXI * percent)
+        query = (
+            self.goal, self.diagonals, percent, grid.regions, run, grid.landmarks.tables.far,
+            GRAIN * blocks.EXPANDED, self.run.path,
+        )  # fmt: skip
         try:
-            work = region_search.begin_regions(
-                *soft, self.start, self.goal, percent, grid.regions, run, distances
+            found, searched, besides, count, cost = coarse_way.set_out(
+                *self._soft, self.start, *query
             )
-            found = OUT_OF_BUDGET
             while found == OUT_OF_BUDGET:
-                found, taken = region_search.search_regions(
-                    *soft, self.goal, self.diagonals, percent, grid.regions, run, distances,
-                    GRAIN * blocks.EXPANDED,
-                )  # fmt: skip
-                work += taken
-                self.coarse += taken / blocks.EXPANDED
-                if found == OUT_OF_BUDGET:
-                    yield work / blocks.EXPANDED
-                    work = 0
-            if found == NO_PATH:
-                if grid.wall == 0:
-                    self.least = math.inf
-                yield work / blocks.EXPANDED
-                return
-            pins, way, touched = tracing.pins_of(
-                soft[-1], self.goal, self.diagonals, grid.regions, run
-            )
+                self.coarse += searched / blocks.EXPANDED
+                yield int(searched + besides) / blocks.EXPANDED
+                found, searched, besides, count, cost = coarse_way.go_on(*self._soft, *query)
         finally:
             _region_runs.put_back(grid.shape, run)
-        path, before = self.run.path, self._in_hand()
-        count, more = tracing.connect(*soft, pins, way, grid.regions, self.diagonals, path)
-        self._choose(int(count), int(way_cost(*self._map, path, 0, count - 1)), before)
-        yield (work + (touched + more) * blocks.TOUCHED) / blocks.EXPANDED
+        self.coarse += searched / blocks.EXPANDED
+        if found != NO_PATH:
+            self._choose(int(count), int(cost), before)
+        elif grid.wall == 0:
+            self.least = math.inf
+        yield int(searched + besides) / blocks.EXPANDED
 
     def learn(self) -> Iterator[float]:
         """Find out about distances for later queries."""
         for work in self.grid.landmarks.grow(self._soft, self.start, self.grid.regions):
             yield work / blocks.EXPANDED
 
-    def _in_hand(self) -> NDArray[np.int32]:
-        """A copy of the way in hand, whose place another is written into."""
-        return self.run.path[: self.run.state[COUNT]].copy()
+    def _in_hand(self) -> NDArray[np.int32] | None:
+        """A copy of the way in hand, if there is one, whose place another is written into."""
+        return None if math.isinf(self.cost) else self.run.path[: self.run.state[COUNT]].copy()
 
-    def _choose(self, count: int, cost: int, before: NDArray[np.int32]) -> None:
+    def _choose(self, count: int, cost: int, before: NDArray[np.int32] | None) -> None:
         """Keep the way of so many cells that was written, or the one before if it is no dearer."""
-        if cost < self.cost:
+        if before is None or cost < self.cost:
             self.run.state[COUNT], self.cost = count, cost
         else:
             self.run.path[: len(before)] = before

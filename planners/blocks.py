@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from planners.arrays import zeroed
 from planners.frontier import NOT_FIRST, NOT_LAST, ONE, SIDE_BITS
 
 CALLED = "a8b7af0524ff"
@@ -44,13 +45,17 @@ class Regions(NamedTuple):
 
 
 def new_regions(rows: int, columns: int) -> Regions:
-    """A map of which nothing is known yet."""
+    """Arrays for a map of that size, of which nothing is known yet."""
     blocks = -(-rows // SIDE) * -(-columns // SIDE)
-    return Regions(
-        count=np.full(blocks, UNKNOWN, np.uint8),
-        mask=np.empty(blocks * MOST, np.uint64),  # not zeroed, which would take longer than a query
-        edge=np.empty(blocks * MOST, np.uint32),
+    regions = Regions(
+        **zeroed(
+            count=(blocks, np.uint8),
+            mask=(blocks * MOST, np.uint64),
+            edge=(blocks * MOST, np.uint32),
+        )
     )
+    regions.count[:] = UNKNOWN
+    return regions
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -33,7 +33,7 @@ from planners.region_search import (
 from planners.search import OUT_OF_BUDGET, SPAN
 from planners.tracing import connect, pins_along
 
-CALLED = "3bd6eb6aa000"
+CALLED = "90658d7752f5"
 
 _EVERYWHERE = -2  # the goal's region of a search that goes on until it has been everywhere
 _GRAIN = 1000 * EXPANDED  # work of such a search between two steps …
@@ -70,6 +70,11 @@ class Landmarks:
         # The search from there; nothing while a query, perhaps in another thread, goes on with it.
         self._search: list[RegionRun | None] = [None]
 
+    @property
+    def known(self) -> bool:
+        """Whether there is a landmark, or one is being made."""
+        return self.tables is not _NONE
+
     def grow(
         self, soft: tuple[NDArray[np.uint8], int, int, int], start: int, regions: Regions
     ) -> Iterator[int]:
@@ -89,7 +94,7 @@ class Landmarks:
         except IndexError:
             return
         try:
-            if self.tables is _NONE:
+            if not self.known:
                 self.tables = _tables(regions.count.size * MOST)
             tables, far, work = self.tables, _NONE.far, 0
             if self._source < 0:

@@ -6,7 +6,7 @@ from numba import njit
 from planners.blocks import ALL, FIRST_COLUMN, LAST_ROW, SIDE, pack
 from planners.frontier import NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "447ebd89fb83"
+CALLED = "b7ddc203ddea"
 
 _TWOS, _FOURS = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
 _EIGHTS = np.uint64(0x0F0F0F0F0F0F0F0F)

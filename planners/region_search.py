@@ -21,7 +21,7 @@ from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region
 from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "447ebd89fb83"
+CALLED = "b7ddc203ddea"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9

@@ -13,7 +13,7 @@ from planners.frontier import ONE, detour, flood, is_clear, least_way, step_cost
 from planners.region_search import LAST_REGION, NEAREST
 from planners.search import DIAGONAL, SPAN, STRAIGHT
 
-CALLED = "462d7bce1679"
+CALLED = "92ba09e5a987"
 
 TAUT = 2
 """How often pins are drawn taut."""
