@@ -12,6 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planners.arrays import zeroed
+from planners.prefetching import prefetch
 from planners.search import (
     ACROSS,
     DIAGONAL,
@@ -45,6 +46,7 @@ and from bit `LENGTH` on `base` - g."""
 _LAST = 1 << 58
 _NARROW = 12  # 4 096 is less than the smallest positive step of f on a free floor
 _ENTRIES = 8
+_AHEAD = 6  # cells: what the search is likely to come to while it is loaded
 
 
 class Run(NamedTuple):
@@ -190,6 +192,9 @@ def search(cost, wall, columns, goal, diagonals, run, budget):
         row = int((node + 0.5) * inverse)
         column = node - row * columns
         down, along = row - goal_row, column - goal_column
+        ahead = node - min(max(down, -_AHEAD), _AHEAD) * columns - min(max(along, -_AHEAD), _AHEAD)
+        prefetch(label, ahead)
+        prefetch(cost, ahead)
         far, near = abs(down), abs(along)
         if near > far:
             far, near = near, far

@@ -25,7 +25,7 @@ from planners.improving import (
 from planners.norms import expected_norm, least_norm
 from planners.search import ACROSS, DIAGONAL, DOWN, SPAN, STEP, STRAIGHT
 
-CALLED = "5f752b2b38cb"
+CALLED = "349f6a1cdc66"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 

@@ -1,9 +1,12 @@
 """The abstract planner on maps of any kind: always a way, never a worse one, then the shortest."""
 
+import copy
+import gc
 import hashlib
 import itertools
 import math
 import os
+import pickle
 import subprocess
 import sys
 
@@ -15,6 +18,7 @@ from hypothesis import strategies as st
 import anytime
 from anytime.errors import AnytimeError
 from planners import Grid, astar, find_path, length_of, route, steps
+from planners.blocks import UNKNOWN
 from sensing import clustered, connected, instance, maze, rooms, uniform
 
 KINDS = {
@@ -319,6 +323,29 @@ def fingerprint(size):
             if step.plan is not None:
                 digest.update(step.plan.plan.tobytes() + repr(step.plan.length).encode())
     return digest.hexdigest()
+
+
+def test_a_copy_of_a_map_knows_nothing_of_what_was_found_out_about_it():
+    free, start, goal = instance("rooms", 96, 0)
+    grid = Grid.known(free)
+    unused = pickle.dumps(grid)
+    first = plans_of(steps(grid, start, goal))[-1]
+    assert pickle.dumps(grid) == unused
+    for again in (copy.copy(grid), pickle.loads(unused)):
+        assert (again.regions.count == UNKNOWN).all()
+        assert plans_of(steps(again, start, goal))[-1].plan.tobytes() == first.plan.tobytes()
+
+
+def test_a_new_map_knows_nothing_of_one_that_is_gone():
+    grid = Grid.known(np.ones((40, 40), bool))
+    plans_of(steps(grid, (0, 0), (39, 39)))
+    left = [grid.regions]
+    left[0].count[:] = 3
+    del grid
+    gc.collect()
+    grid = Grid.known(np.ones((40, 40), bool))
+    assert grid.regions is left.pop()
+    assert (grid.regions.count == UNKNOWN).all()
 
 
 def elsewhere(size, **environment):
