@@ -20,7 +20,7 @@ def prefetch(array, index):
 
 @overload(prefetch)
 def _prefetch(array, index):
-    return lambda array, index: _instruction(array, index)
+    return lambda array, index: _instruction(array, index)  # pyright: ignore[reportCallIssue]
 
 
 @intrinsic
