@@ -6,7 +6,8 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 Arrays = TypeVar("Arrays")
-_SIZES = 4  # of maps whose arrays are kept: a map that grows must not leave all it ever had
+_SIZES = 4  # of maps whose arrays are kept: a map that grows must not leave all it ever had …
+_EACH = 8  # … nor a thousand maps of one size as many
 
 
 class Pool(Generic[Arrays]):
@@ -26,7 +27,8 @@ class Pool(Generic[Arrays]):
     def put_back(self, shape: tuple[int, int], arrays: Arrays) -> None:
         """Leave arrays to the next; those of the size that was not used for longest are dropped."""
         kept = self._kept.pop(shape, [])
-        kept.append(arrays)
+        if len(kept) < _EACH:
+            kept.append(arrays)
         self._kept[shape] = kept
         for other in list(self._kept)[:-_SIZES]:
             self._kept.pop(other, None)
