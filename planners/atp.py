@@ -32,7 +32,8 @@ from planners.search import NO_PATH, OUT_OF_BUDGET, SPAN, UNLIMITED
 
 GRAIN = 500
 """Expansions between two steps: a fraction of a millisecond …"""
-_FIRST_GRAIN = 4 * GRAIN  # … more of them while there is no way yet that could be told
+_FIRST_GRAIN = 4 * GRAIN  # … more of them while there is no way yet that could be told …
+_FIRST_REGIONS = 2 * GRAIN  # … or of regions, each of which takes as long as five cells
 _SMALL = 64  # cells of distance up to which exact search may be all that is needed …
 _SMALL_BUDGET = 2500  # … and the expansions that it gets
 _CLUSTERED = 0.15  # clustering from which on obstacles count as walls
@@ -126,7 +127,12 @@ class _Query:
             if self.done:
                 return
         density, clustering, looked = self.grid.features
-        yield looked / blocks.EXPANDED
+        besides = looked / blocks.EXPANDED  # told with the first step: another takes microseconds
+        for work in self._phases(density, clustering, far):
+            yield besides + work
+            besides = 0.0
+
+    def _phases(self, density: float, clustering: float, far: int) -> Iterator[float]:
         if clustering < _CLUSTERED:
             yield from self.search(_first_scale(density, far), patience=_PATIENCE * far)
             for scale in _SCALES:
@@ -141,7 +147,8 @@ class _Query:
             if self.done:
                 return
         else:
-            yield from self.over_known_regions()
+            if self.grid.landmarks.known:
+                yield from self.over_known_regions()
             if not self.done:
                 yield from self.over_regions()
             if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
@@ -211,11 +218,8 @@ class _Query:
             expected_norm(self.grid.features[0], scale, self.diagonals, self.run.norm)
 
     def over_known_regions(self) -> Iterator[float]:
-        """A first way by what earlier queries have found out about distances, if they have."""
-        grid = self.grid
-        if not grid.landmarks.known:
-            return
-        before = self._in_hand()
+        """A first way by what earlier queries have found out about distances."""
+        grid, before = self.grid, self._in_hand()
         count, cost, work = known_way(
             *self._soft, self.start, self.goal, self.diagonals, grid.regions,
             grid.landmarks.tables, self.run.path,
@@ -231,9 +235,10 @@ class _Query:
         percent = round(_REGION_PERCENT + _PERCENT_DOUBLED * math.log2(max(far / 128, 1.0)))
         if not self.diagonals:
             percent = round(_TAXI * percent)
+        grain = _FIRST_REGIONS if before is None else GRAIN
         query = (
             self.goal, self.diagonals, percent, grid.regions, run, grid.landmarks.tables.far,
-            GRAIN * blocks.EXPANDED, self.run.path,
+            grain * blocks.EXPANDED, self.run.path,
         )  # fmt: skip
         try:
             found, searched, besides, count, cost = coarse_way.set_out(
