@@ -24,10 +24,10 @@ def _prefetch(array, index):
 
 
 @intrinsic
-def _instruction(_typing, array, index):
-    def build(context, builder, signature, arguments):
-        data = context.make_array(array)(context, builder, arguments[0]).data
-        place = builder.bitcast(builder.gep(data, [arguments[1]]), ir.IntType(8).as_pointer())
+def _instruction(typingctx, array, index):
+    def codegen(context, builder, signature, args):
+        data = context.make_array(array)(context, builder, args[0]).data
+        place = builder.bitcast(builder.gep(data, [args[1]]), ir.IntType(8).as_pointer())
         kinds = [place.type, *[ir.IntType(32)] * 3]
         function = builder.module.declare_intrinsic(
             "llvm.prefetch", [place.type], ir.FunctionType(ir.VoidType(), kinds)
@@ -35,4 +35,4 @@ def _instruction(_typing, array, index):
         builder.call(function, [place, _READ, _CLOSEST, _DATA])
         return context.get_dummy_value()
 
-    return types.void(array, index), build
+    return types.void(array, index), codegen
