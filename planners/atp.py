@@ -127,45 +127,46 @@ class _Query:
             if self.done:
                 return
         density, clustering, looked = self.grid.features
+        scale = _first_scale(density, far)
+        works = self.through(scale, far) if clustering < _CLUSTERED else self.around(scale, far)
         besides = looked / blocks.EXPANDED  # told with the first step: another takes microseconds
-        for work in self._phases(density, clustering, far):
+        for work in works:
             yield besides + work
             besides = 0.0
+        if not self.done:
+            yield from self.search()
 
-    def _phases(self, density: float, clustering: float, far: int) -> Iterator[float]:
-        if clustering < _CLUSTERED:
-            yield from self.search(_first_scale(density, far), patience=_PATIENCE * far)
-            for scale in _SCALES:
-                if self.done or math.isinf(self.cost):
-                    break
-                spent = 0.0
-                for work in self.search(scale):
-                    spent += work
-                    yield work
-                if spent > _WIDE * far**2:
-                    break
-            if self.done:
-                return
-        else:
-            if self.grid.landmarks.known:
-                yield from self.over_known_regions()
-            if not self.done:
-                yield from self.over_regions()
-            if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
-                yield from self.search(_first_scale(density, far), patience=_PATIENCE * far)
-            if self.done:
-                return
-            yield from self.learn()
-            left = _WINDOW_SHARE * self.coarse
-            for length in () if math.isinf(self.cost) else _WINDOWS:
-                for work in self.windows(length):
-                    yield work
-                    left -= work
-                    if left < 0:
-                        break
+    def through(self, scale: float, far: int) -> Iterator[float]:
+        """Ways straight through obstacles that are independent of each other."""
+        yield from self.search(scale, patience=_PATIENCE * far)
+        for scale in _SCALES:
+            if self.done or math.isinf(self.cost):
+                break
+            spent = 0.0
+            for work in self.search(scale):
+                spent += work
+                yield work
+            if spent > _WIDE * far**2:
+                break
+
+    def around(self, scale: float, far: int) -> Iterator[float]:
+        """Ways around walls, over regions first."""
+        if self.grid.landmarks.known:
+            yield from self.over_known_regions()
+        if not self.done:
+            yield from self.over_regions()
+        if math.isinf(self.cost):  # the ends do not hang together but by believed obstacles
+            yield from self.search(scale, patience=_PATIENCE * far)
+        if self.done:
+            return
+        yield from self.learn()
+        left = _WINDOW_SHARE * self.coarse
+        for length in () if math.isinf(self.cost) else _WINDOWS:
+            for work in self.windows(length):
+                yield work
+                left -= work
                 if left < 0:
-                    break
-        yield from self.search()
+                    return
 
     @property
     def done(self) -> bool:
