@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from functools import cached_property
 from typing import Any
 
@@ -87,8 +86,13 @@ class Grid:
         """What queries have found out about the map's blocks so far."""
         regions = _regions.take(self.shape)
         regions.count[:] = UNKNOWN
-        weakref.finalize(self, _regions.put_back, self.shape, regions).atexit = False
         return regions
+
+    def __del__(self, put_back=_regions.put_back) -> None:
+        # Not by a weak reference: who revives the map must not share arrays with another.
+        regions = vars(self).pop("regions", None)
+        if regions is not None:
+            put_back(self.shape, regions)
 
     @cached_property
     def landmarks(self) -> Landmarks:
@@ -126,7 +130,7 @@ class Grid:
             if not np.isin(patch, (0.0, 1.0)).all():
                 raise AnytimeError("the map is known: its cells are 0 (free) or 1 (blocked)")
             cost = (patch == 0.0).astype(np.uint8)
-            self.cost = self.cost if self.cost.flags.writeable else self.cost.copy()
+        self.cost = self.cost if self.cost.flags.writeable else self.cost.copy()
         self.cost.reshape(rows, columns)[top : top + height, left : left + width] = cost.reshape(
             height, width
         )
@@ -142,7 +146,8 @@ class Grid:
     def __getstate__(self) -> dict[str, Any]:
         """The map alone: a copy finds out anew, in arrays of its own."""
         found_out = ("regions", "landmarks", "_features")
-        return {name: value for name, value in vars(self).items() if name not in found_out}
+        state = {name: value for name, value in vars(self).items() if name not in found_out}
+        return {**state, "cost": self.cost.copy()}
 
     def __repr__(self) -> str:
         seen = int((self.regions.count != 255).sum())

@@ -90,7 +90,7 @@ def flat(grid: NDArray[Any], name: str) -> NDArray[np.uint8]:
         )
     flags = grid.flags
     # For arrays that may not be written numba would compile every kernel once more.
-    cells = grid if flags.c_contiguous and flags.writeable else grid.copy()
+    cells = grid if flags.c_contiguous and flags.writeable else np.array(grid, order="C")
     return np.frombuffer(cells, np.uint8)
 
 

@@ -348,6 +348,35 @@ def test_a_new_map_knows_nothing_of_one_that_is_gone():
     assert (grid.regions.count == UNKNOWN).all()
 
 
+def test_a_copy_of_a_map_may_change_alone():
+    free, start, goal = instance("rooms", 96, 0)
+    grid = Grid.known(free.copy())
+    first = plans_of(steps(grid, start, goal))[-1]
+    changed = copy.copy(grid)
+    changed.update(40, 0, np.ones((1, free.shape[1])))
+    assert plans_of(steps(grid, start, goal))[-1].plan.tobytes() == first.plan.tobytes()
+    assert len(plans_of(steps(changed, start, goal))[-1].plan) == 0
+
+
+def test_a_map_that_is_revived_shares_nothing_with_the_next():
+    revived = []
+
+    def robot(grid):
+        try:
+            yield from steps(grid, (0, 0), (95, 95))
+        finally:
+            revived.append(grid)
+
+    holder = [robot(Grid.known(instance("rooms", 96, 1)[0]))]
+    holder.append(holder)
+    for _ in range(3):
+        next(holder[0])
+    del holder
+    gc.collect()
+    other = Grid.known(instance("rooms", 96, 2)[0])
+    assert other.regions is not revived[0].regions
+
+
 def elsewhere(size, **environment):
     """The fingerprint as another process computes it."""
     program = (

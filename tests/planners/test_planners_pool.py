@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.pool import _EACH, _SIZES, Pool
+from planners.pool import Pool
 
 shapes = st.tuples(st.integers(1, 3), st.integers(1, 3))
 
@@ -23,11 +23,11 @@ def test_it_keeps_the_sizes_that_were_used_last(used):
     for shape in used:
         pool.put_back(shape, pool.take(shape))
     latest = list(dict.fromkeys(reversed(used)))
-    assert set(pool._kept) == set(latest[:_SIZES])
+    assert set(pool._kept) == set(latest[: Pool.SIZES])
 
 
 def test_it_keeps_but_a_few_of_each_size():
     pool = Pool(lambda rows, columns: np.zeros((rows, columns)))
-    for arrays in [pool.take((1, 1)) for _ in range(3 * _EACH)]:
+    for arrays in [pool.take((1, 1)) for _ in range(3 * Pool.EACH)]:
         pool.put_back((1, 1), arrays)
-    assert len(pool._kept[1, 1]) == _EACH
+    assert len(pool._kept[1, 1]) == Pool.EACH
