@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 from anytime.clocks import Clock
+from anytime.errors import AnytimeError
 from monitor.states import Situation
 
 
@@ -75,3 +76,19 @@ class Reactive(Protocol):
     def avoid(self, speed: float) -> None:
         """Start towards the goal by obstacle avoidance alone, further each time in a row."""
         ...
+
+
+MEMBERS = tuple(name for name in vars(Robot) if not name.startswith("_"))
+
+
+def must_be_whole(robot: Robot) -> None:
+    """Raise AnytimeError if a robot lacks one of its members, or is a class."""
+    if isinstance(robot, type):
+        raise AnytimeError(f"the robot is the class {robot.__name__}; give one that it makes")
+    # By the class where it can be: to ask a robot for its clock may raise what is its own matter.
+    missing = [name for name in MEMBERS if not (hasattr(type(robot), name) or hasattr(robot, name))]
+    if missing:
+        raise AnytimeError(
+            f"the robot, a {type(robot).__name__}, has no {', '.join(missing)}; a robot has "
+            + ", ".join(MEMBERS)
+        )

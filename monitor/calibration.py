@@ -14,6 +14,7 @@ from anytime.programs import makers
 from compiler import CompiledProgram
 from monitor.bodies import Robot
 from monitor.courses import Course, Leg, course_of, legs_of, refined, smoothed
+from monitor.endings import Ending
 from monitor.inter_frame import Contracts, Spread
 from monitor.missions import Mission, Value
 from monitor.monitoring import Monitor
@@ -68,6 +69,7 @@ def live_steadily(
 
     levels: sensing times, spread over those of the contracts. Each is lived once for each seed.
     """
+    _must_live(seeds)
     sensing = np.unique(contracts.shares[:, 0])
     chosen = sensing[np.unique(np.linspace(0, len(sensing) - 1, levels).round().astype(int))]
     longest = float(contracts.shares[:, 1:].sum(axis=1).max())
@@ -132,7 +134,7 @@ def _steady(
             raise AnytimeError("make_robot gives the same robot again; let it make one each time")
         made.append(robot)
         route = robot.situation().to_go
-        report = Monitor(program, policy, "constant").run(endless, robot, seed=seed)
+        report = _sound(Monitor(program, policy, "constant").run(endless, robot, seed=seed))
         if report and route > 0:
             lived.append(_lived(shares[0], route, report))
             legs.append(legs_of(report))
@@ -213,12 +215,16 @@ def calibrate(
 
     It lives the mission for each seed, `rounds` times, the later ones with what it learnt.
     """
+    _must_live(seeds)
+    if rhythm is None:  # pyright: ignore[reportUnnecessaryComparison]
+        raise AnytimeError("there is no rhythm: no mission reached its goal when it was measured")
     policy = Expected(mission, contracts, rhythm, Spread())
     endless = _patient(mission)
     for _ in range(rounds):
         monitor = Monitor(program, policy, "expected", rhythm)
         lived = [
-            _foreseen_and_real(monitor.run(endless, make_robot(), seed=seed)) for seed in seeds
+            _foreseen_and_real(_sound(monitor.run(endless, make_robot(), seed=seed)))
+            for seed in seeds
         ]
         policy = Expected(mission, contracts, rhythm, spread_of(lived))
     return policy
@@ -250,6 +256,18 @@ def spread_of(lived: Sequence[Sequence[tuple[float, float]]]) -> Spread:
         kept.append(first)
         ratios.append(tuple(np.quantile(begun[:, 1] / begun[:, 0], shares).tolist()))
     return Spread(tuple(kept), tuple(ratios))
+
+
+def _must_live(seeds: Sequence[int]) -> None:
+    if not len(seeds):
+        raise AnytimeError("seeds is empty; give one for each mission to live")
+
+
+def _sound(report: Report) -> Report:
+    """A mission that says something of missions: raises AnytimeError for what a robot did wrong."""
+    if report.ending is Ending.INTERNAL:
+        raise AnytimeError(f"a mission of calibration ended: {report.fault}")
+    return report
 
 
 def _foreseen_and_real(report: Report) -> list[tuple[float, float]]:

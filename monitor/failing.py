@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from anytime.clocks import is_number
 from anytime.results import Result
 from compiler import CompiledProgram
 from monitor.missions import Mission
@@ -51,10 +53,24 @@ class Failures:
         return self.quarantined or self.fruitless >= FAILURES
 
 
-def is_sound(decision: Decision) -> bool:
-    """Whether a decision can be carried out: finite times >= 0, and a speed that moves."""
-    times = decision.shares.values()
-    return all(0 <= time < math.inf for time in times) and 0 < decision.speed < math.inf
+def unsound(decision: Decision, labels: Sequence[str]) -> str:
+    """Why a decision cannot be carried out; empty if it can.
+
+    It is a Decision with a finite time >= 0 for each of the calls, and a speed that moves.
+    """
+    if not isinstance(decision, Decision):  # pyright: ignore[reportUnnecessaryIsInstance]
+        return f"it gives {decision!r}, no Decision"
+    if not isinstance(decision.why, Why):  # pyright: ignore[reportUnnecessaryIsInstance]
+        return f"its reason is {decision.why!r}, no Why"
+    for label in labels:
+        if label not in decision.shares:
+            return f"it gives no time to {label!r}"
+    for label, time in decision.shares.items():
+        if not is_number(time) or not 0 <= time < math.inf:
+            return f"it gives {time!r} s to {label!r}, no finite number >= 0"
+    if not is_number(decision.speed) or not 0 < decision.speed < math.inf:
+        return f"its speed is {decision.speed!r}, no finite number > 0"
+    return ""
 
 
 def last_resort(program: CompiledProgram, mission: Mission) -> Decision:

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from anytime.clocks import is_number
 from anytime.errors import AnytimeError
 
 Floats = NDArray[np.float64]
@@ -34,8 +35,8 @@ class Value:
                 f"value.kind is {self.kind!r}; it must be linear, exponential, soft or hard"
             )
         for name, number in (("worth", self.worth), ("seconds", self.seconds)):
-            if not 0 < number < math.inf:
-                raise AnytimeError(f"value.{name} is {number}; it must be a finite number > 0")
+            if not is_number(number) or not 0 < number < math.inf:
+                raise AnytimeError(f"value.{name} is {number!r}; it must be a finite number > 0")
 
     def __call__(self, time: ArrayLike) -> Floats:
         """The value of completing at each time, in seconds since the task was presented."""
@@ -70,8 +71,8 @@ class Energy:
     def __post_init__(self) -> None:
         for name in ("price", "base", "square", "idle"):
             number = getattr(self, name)
-            if not 0 <= number < math.inf:
-                raise AnytimeError(f"energy.{name} is {number}; it must be a finite number >= 0")
+            if not is_number(number) or not 0 <= number < math.inf:
+                raise AnytimeError(f"energy.{name} is {number!r}; it must be a finite number >= 0")
 
     def power(self, speed: ArrayLike) -> Floats:
         """Energy a second at each speed."""
@@ -89,8 +90,8 @@ class News:
     value: Value
 
     def __post_init__(self) -> None:
-        if not 0 < self.at < math.inf:
-            raise AnytimeError(f"news.at is {self.at}; it must be a finite number > 0")
+        if not is_number(self.at) or not 0 < self.at < math.inf:
+            raise AnytimeError(f"news.at is {self.at!r}; it must be a finite number > 0")
 
 
 @dataclass(frozen=True)
@@ -114,11 +115,22 @@ class Mission:
     news: News | None = None
 
     def __post_init__(self) -> None:
-        slow, fast = self.speeds
-        if not 0 < slow <= fast < math.inf:
-            raise AnytimeError(f"speeds are {self.speeds}; they must be 0 < least <= greatest")
-        if not 0 <= self.job < math.inf or not 0 <= self.gain < math.inf:
-            raise AnytimeError("job and gain must be finite numbers >= 0")
+        for name, kind in (("value", Value), ("energy", Energy)):
+            if not isinstance(getattr(self, name), kind):
+                raise AnytimeError(
+                    f"{name} is {getattr(self, name)!r}; it must be a {kind.__name__}"
+                )
+        try:
+            slow, fast = self.speeds
+            sound = is_number(slow) and is_number(fast) and 0 < slow <= fast < math.inf
+        except (TypeError, ValueError):  # not a pair
+            sound = False
+        if not sound:
+            raise AnytimeError(f"speeds are {self.speeds!r}; they must be 0 < least <= greatest")
+        for name in ("job", "gain"):
+            number = getattr(self, name)
+            if not is_number(number) or not 0 <= number < math.inf:
+                raise AnytimeError(f"{name} is {number!r}; it must be a finite number >= 0")
 
     def known(self, time: float) -> Mission:
         """The mission as it is known at a time, without what comes later."""

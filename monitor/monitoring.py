@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import numbers
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,17 +16,18 @@ from anytime.programs import makers
 from anytime.results import Fault, Result
 from compiler import CompiledProgram
 from compiler.executing import known_of
-from monitor.bodies import Robot
+from monitor.bodies import Robot, must_be_whole
 from monitor.endings import Ending
-from monitor.failing import Failures, is_sound, last_resort
+from monitor.failing import Failures, last_resort, unsound
 from monitor.interrupting import Interruption, interruptible
 from monitor.missions import Mission
 from monitor.policies import Policy
 from monitor.reports import CallRecord, Frame, Moment, Report
 from monitor.rhythms import Rhythm
-from monitor.states import Decision, Situation, State, checked
+from monitor.states import Decision, Situation, State, checked, loggable
 
-STILL = 100  # frames in a row in which no time passes, that end a mission
+STILL = 100  # frames in a row in which no time passes, that end a mission …
+UNMOVED = 10_000  # … as do so many in which the robot does not move
 NO_PLAN = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)  # what one raises
 Listener = Callable[[Frame], None]
 
@@ -43,6 +44,12 @@ class Monitor:
     name: str = "expected"
     rhythm: Rhythm | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.program, CompiledProgram):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"the program is a {type(self.program).__name__}, not compiled")
+        if not callable(self.policy):
+            raise AnytimeError(f"the policy is {self.policy!r}; give a function of a State")
+
     def decide(self, state: State) -> Decision:
         """The decision in a state."""
         return self.policy(state)
@@ -58,12 +65,13 @@ class Monitor:
         """Live a mission to one of the endings of the closed set.
 
         seed: of everything random in the modules, >= 0. listen: called with each frame when it is
-        over. Raises AnytimeError for a negative seed, before anything moves.
+        over. Raises AnytimeError for what is no mission, robot or seed, before anything moves.
         """
-        if isinstance(robot, type):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise AnytimeError(f"the robot is the class {robot.__name__}; give one that it makes")
-        if seed < 0:
-            raise AnytimeError(f"seed is {seed}; it must be a whole number >= 0")
+        if not isinstance(mission, Mission):  # pyright: ignore[reportUnnecessaryIsInstance]
+            raise AnytimeError(f"the mission is a {type(mission).__name__}; give a Mission")
+        must_be_whole(robot)
+        if not isinstance(seed, numbers.Integral) or seed < 0:
+            raise AnytimeError(f"seed is {seed!r}; it must be a whole number >= 0")
         with interruptible() as told, settled(isinstance(robot.clock, WallClock)):
             life = _Life(self, mission, robot, seed, listen, told)
             fault = ""
@@ -73,10 +81,12 @@ class Monitor:
                 ending = Ending.ABORTED
             except ConnectionError as error:
                 ending, fault = Ending.LINK_LOST, str(Fault.of(error))
-            except Exception as error:
+            except BaseException as error:  # a robot that exits must be stopped too
                 ending, fault = Ending.INTERNAL, str(Fault.of(error))
-            with contextlib.suppress(Exception):  # one that cannot even stop ends the mission too
+            try:
                 robot.stop()
+            except (Exception, SystemExit) as error:
+                life.failures.note(f"the robot could not be stopped: {Fault.of(error)}")
             return life.report(ending, fault)
 
 
@@ -95,7 +105,7 @@ class _Life:
         self.monitor, self.mission, self.robot, self.seed = monitor, mission, robot, seed
         self.listen, self.told = listen, told
         self.failures = Failures()
-        self.still = 0
+        self.still = self.unmoved = 0
         self.frames: list[Frame] = []
         self.presented = robot.clock.now()
         self.promised = float("nan")
@@ -121,11 +131,12 @@ class _Life:
                 return Ending.DEADLINE
             if standing and self.failures.no_plan_in_sight:
                 return Ending.MODULES_FAILED
-            before = self.time()
+            before, driven = self.time(), self.robot.driven()
             plan, made_on, had_result = self.frame(standing, situation, made_on)
             self.failures.fruitless = 0 if had_result else self.failures.fruitless + 1
             self.still = 0 if self.time() > before else self.still + 1
-            if self.still >= STILL:
+            self.unmoved = 0 if self.robot.driven() > driven else self.unmoved + 1
+            if self.still >= STILL or self.unmoved >= UNMOVED:
                 return Ending.BLOCKED
 
     def set_out(self, plan: Any) -> bool:
@@ -151,12 +162,9 @@ class _Life:
         """The policy's decision; the one before, or the last resort, when it has none."""
         try:
             decision = self.monitor.decide(state)
-            missing = {*self.monitor.program.labels} - {*decision.shares}
-            if is_sound(decision) and not missing:
+            reason = unsound(decision, self.monitor.program.labels)
+            if not reason:
                 return decision
-            reason = "its times or its speed are no finite numbers"
-            if missing:
-                reason = f"it gives no time to {min(missing)!r}"
         except Exception as error:
             reason = str(Fault.of(error))
         self.failures.note(f"the policy {self.monitor.name} failed: {reason}")
@@ -218,7 +226,7 @@ class _Life:
                 driven=self.robot.driven() - driven,
                 energy=after.energy - energy,
                 interrupted=interrupted,
-                story=self.robot.story(),
+                story=loggable(self.robot.story()),
                 situation=situation,
                 made_on=made_on,
             )
@@ -318,7 +326,7 @@ class _Life:
                 )
             )
             began = self.time()
-            situation = self.robot.situation()
+            situation = checked(self.robot.situation())
             if state.standing or situation.interrupted:  # nothing to steer
                 continue
             now = replace(
@@ -346,8 +354,12 @@ class _Life:
     def report(self, ending: Ending, fault: str) -> Report:
         seconds = self.time()
         energy = sum(frame.energy for frame in self.frames)
-        with contextlib.suppress(Exception):  # else what is known of the frames that ended
-            energy = self.robot.situation().energy
+        try:
+            energy = checked(self.robot.situation()).energy
+        except AnytimeError as error:  # else what is known of the frames that ended
+            self.failures.note(str(Fault.of(error)))
+        except Exception:  # of a link that is lost, for one
+            pass
         reached = ending is Ending.REACHED
         return Report(
             mission=self.mission.name,

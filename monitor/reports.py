@@ -74,12 +74,12 @@ class Frame:
         return self.ended - self.started - self.driven
 
     def told(self, name: str) -> float:
-        """A number in the robot's story. Raises AnytimeError where it tells none by that name."""
+        """A length in the robot's story. Raises AnytimeError where it tells none by that name."""
         value: Any = self.story.get(name)
-        if not is_number(value):
+        if not is_number(value) or not 0 <= value < math.inf:
             raise AnytimeError(
                 f"the robot's story says {name!r} is {value!r}; calibration needs the lengths "
-                "walked and planned, `length` and `planned`, as numbers"
+                "walked and planned, `length` and `planned`, as finite numbers >= 0"
             )
         return float(value)
 

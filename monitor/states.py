@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from anytime.clocks import is_number
 from anytime.errors import AnytimeError
@@ -36,12 +36,31 @@ def checked(situation: Situation) -> Situation:
     Raises AnytimeError, which names what cannot: energy and lengths are numbers >= 0, and finite
     but for the way to go.
     """
+    if not isinstance(situation, Situation):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"the robot's situation() gives {situation!r}; give a Situation")
+    ending = situation.ending
+    if ending is not None and not isinstance(ending, Ending):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"the robot's situation says ending = {ending!r}, no Ending or None")
     for name in ("energy", "to_go", "in_hand"):
         value = getattr(situation, name)
         finite = is_number(value) and (name == "to_go" or value < math.inf)
         if not finite or not value >= 0:
             raise AnytimeError(f"the robot's situation says {name} = {value!r}, no number >= 0")
     return situation
+
+
+def loggable(story: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What a robot tells of a frame, if it can be logged.
+
+    Raises AnytimeError if it is no mapping, or a length in it no finite number >= 0.
+    """
+    if not isinstance(story, Mapping):  # pyright: ignore[reportUnnecessaryIsInstance]
+        raise AnytimeError(f"the robot's story() gives {story!r}; give a dict")
+    for name in ("length", "planned"):
+        value = story.get(name, 0.0)
+        if not is_number(value) or not 0 <= value < math.inf:
+            raise AnytimeError(f"the robot's story says {name} = {value!r}, no finite number >= 0")
+    return story
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ import copy
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
+from anytime.clocks import is_number
+from anytime.errors import AnytimeError
 from anytime.testing import ConformanceError
-from monitor.bodies import Robot
-from monitor.endings import Ending
-from monitor.states import Situation
+from monitor.bodies import Robot, must_be_whole
+from monitor.states import Situation, checked, loggable
 
 Make = Callable[[], Robot]
 Plan = Callable[[Mapping[str, Any]], Any]
@@ -38,6 +39,24 @@ def conforms(make: Make, plan: Plan, *, speed: float) -> None:
     """
     for check in CHECKS:
         check(make, plan, speed=speed)
+
+
+def tells_what_can_be(make: Make, plan: Plan, *, speed: float) -> None:
+    """Has it all that a robot has, and is what it tells of itself of the right kinds?"""
+    robot = make()
+    try:
+        must_be_whole(robot)
+        checked(robot.situation())
+        loggable(robot.story())
+    except AnytimeError as error:
+        raise ConformanceError(str(error)) from None
+    for name in ("inputs", "picture"):
+        told = getattr(robot, name)()
+        if not isinstance(told, Mapping):
+            raise ConformanceError(f"{name}() gives {told!r}; give a dict")
+    moved: Any = robot.driven()
+    if not is_number(moved):
+        raise ConformanceError(f"driven() gives {moved!r}; give seconds")
 
 
 def starts_standing(make: Make, plan: Plan, *, speed: float) -> None:
@@ -127,8 +146,6 @@ def completes(make: Make, plan: Plan, *, speed: float) -> None:
     again = robot.clock.now() - there
     if again > _no_time(robot):
         raise ConformanceError(f"complete() of a plan that is done takes {again:.3g} s again")
-    if after.ending is not None and not isinstance(after.ending, Ending):  # pyright: ignore
-        raise ConformanceError(f"ending is {after.ending!r}; give one of monitor.Ending")
 
 
 def stops(make: Make, plan: Plan, *, speed: float) -> None:
@@ -158,6 +175,7 @@ def repeats(make: Make, plan: Plan, *, speed: float) -> None:
 
 
 CHECKS: tuple[Check, ...] = (
+    tells_what_can_be,
     starts_standing,
     reading_changes_nothing,
     orders_take_no_time,

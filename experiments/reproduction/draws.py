@@ -29,7 +29,8 @@ def drawn(
     with processes(2) as pool:
         made = pool.map(_draw, [tuple(claims)] * len(missing), missing)
         for done, (seed, draw) in enumerate(zip(missing, made, strict=True), 1):
-            kept.keep(_name(seed), draw)
+            before = kept.get(_name(seed)) or {}  # of other claims
+            kept.keep(_name(seed), {**before, **draw})
             progress(len(seeds) - len(missing) + done, len(seeds))
     return [kept.get(_name(seed)) for seed in seeds]
 

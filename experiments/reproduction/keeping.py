@@ -57,10 +57,11 @@ def _number(value: Any) -> float | int:
 
 
 @contextlib.contextmanager
-def opened(folder: Path) -> Generator[Kept]:
+def opened(folder: Path, *, anew: bool = False) -> Generator[Kept]:
     """The findings in a folder, none if it has no file of them.
 
-    Raises AnytimeError for what is no such file, and while another process writes to it.
+    anew: those that are there make way for the first new one; until then nothing is lost. Raises
+    AnytimeError for what is no such file, and while another process writes to it.
     """
-    with journals.opened(folder / FILE, _About(), _Finding) as journal:
+    with journals.opened(folder / FILE, _About(), _Finding, anew=anew) as journal:
         yield Kept(journal)

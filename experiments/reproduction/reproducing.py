@@ -15,7 +15,7 @@ from experiments.reproduction import rivals
 from experiments.reproduction.animations import Animated
 from experiments.reproduction.claims import Claim, Verdict
 from experiments.reproduction.draws import drawn, known, verdicts
-from experiments.reproduction.keeping import FILE, opened
+from experiments.reproduction.keeping import opened
 from experiments.reproduction.pictures import Picture
 from experiments.reproduction.rows import SIGNS, bounds, shown
 from experiments.reproduction.sweeps import Sweep
@@ -87,7 +87,8 @@ def measure(
 
     parts: names of files here, which hold `CLAIMS`, `draw` and `animate`. A draw of all claims is
     one seed; the same seeds serve both ways. What is found is kept beside the page as it comes;
-    resume: go on from there, else it is removed.
+    resume: go on from there, else it makes way for the first
+    new finding.
     """
     modules = {
         part: importlib.import_module(f"experiments.reproduction.{part}")
@@ -97,9 +98,7 @@ def measure(
     claims = tuple(claim for module in modules.values() for claim in module.CLAIMS)
     count = QUICK_DRAWS if quick else DRAWS
     form = "quick " if quick else ""
-    if not resume:
-        (output / FILE).unlink(missing_ok=True)
-    with opened(output) as kept:
+    with opened(output, anew=not resume) as kept:
         draws = drawn(claims, range(seed, seed + count), kept, progress) if claims else []
         swept = [
             sweep

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from anytime.__main__ import main
+from anytime.errors import AnytimeError
 from experiments.reproduction import (
     executions,
     nao,
@@ -173,6 +174,22 @@ def test_one_that_was_killed_goes_on_and_finds_what_an_uninterrupted_one_finds(t
     assert found == whole
 
 
+def test_what_was_found_makes_way_for_the_first_new_finding_alone(tmp_path):
+    with opened(tmp_path) as kept:
+        kept.keep("bench", 1)
+        with pytest.raises(AnytimeError, match="another process"), opened(tmp_path, anew=True):
+            pass
+    with opened(tmp_path, anew=True):
+        pass
+    with opened(tmp_path) as kept:
+        assert kept.get("bench") == 1
+    with opened(tmp_path, anew=True) as kept:
+        assert kept.get("bench") is None
+        kept.keep("other", 2)
+    with opened(tmp_path) as kept:
+        assert (kept.get("bench"), kept.get("other")) == (None, 2)
+
+
 def test_what_is_kept_is_not_found_again(tmp_path):
     found = {"figure": np.float64(0.1), "count": np.int64(2), "both": (1.5, math.nan)}
     told = {"figure": 0.1, "count": 2, "both": [1.5, None]}
@@ -190,6 +207,7 @@ def test_a_draw_without_one_of_the_claims_is_made_again(tmp_path):
         first, second = drawn(claims, range(2), kept)
     assert first[claims[0].name]["paper"] == [0.5]
     assert second[claims[0].name]["paper"] == list(claims[0].draw(1, PAPER))
+    assert second["another"] == {"paper": [0.5], "ours": [0.5]}  # of another part
 
 
 def test_the_command_prints_one_object_draws_its_picture_and_goes_on(capsys, tmp_path, monkeypatch):

@@ -15,7 +15,9 @@ from anytime.faults import CLOCK, MODULE, Fault, FaultyClock, Schedule, read_sch
 from experiments import crossings
 from experiments.benchmarks import faulty_missions
 from experiments.benchmarks.faulty_missions import MISSION
-from monitor import Ending, Monitor
+from monitor import Decision, Ending, Monitor, Value
+from monitor.calibration import measure_rhythm
+from monitor.inter_frame import compiled_contracts
 from monitor.policies import constant
 from monitor.robots.faulty import LOG, ROBOT, FaultyRobot, faulty_program, kinds_of
 from monitor.robots.grid import GridRobot, Scene
@@ -106,7 +108,12 @@ def test_a_policy_that_forgets_a_call_leaves_the_last_resort():
 
 
 @pytest.mark.parametrize(
-    ("told", "wrong"), [({"energy": math.nan}, "energy = nan"), ({"to_go": -5.0}, "to_go = -5.0")]
+    ("told", "wrong"),
+    [
+        ({"energy": math.nan}, "energy = nan"),
+        ({"to_go": -5.0}, "to_go = -5.0"),
+        ({"ending": "reached"}, "ending = 'reached'"),
+    ],
 )
 def test_a_robot_that_tells_nonsense_of_itself_is_named(told, wrong, tmp_path):
     class Confused(GridRobot):
@@ -117,6 +124,120 @@ def test_a_robot_that_tells_nonsense_of_itself_is_named(told, wrong, tmp_path):
     report = Monitor(PROGRAM, STEADY, "c").run(MISSION, robot)
     assert report.ending is Ending.INTERNAL
     assert f"the robot's situation says {wrong}" in report.fault
+
+
+def crossing(robot, policy=STEADY, mission=MISSION):
+    return Monitor(PROGRAM, policy, "c").run(mission, robot)
+
+
+def grid_robot(kind=GridRobot):
+    return kind(floor(), MISSION.energy, WorkClock(REFERENCE))
+
+
+@pytest.mark.parametrize("name", ["inputs", "begin", "complete", "situation"])
+@pytest.mark.parametrize("way_out", [SystemExit, GeneratorExit])
+def test_a_robot_that_exits_is_stopped_and_what_was_lived_is_told(name, way_out):
+    stops = []
+
+    class Exits(GridRobot):
+        def stop(self):
+            stops.append(self.clock.now())
+            super().stop()
+
+    robot = grid_robot(Exits)
+
+    def exits(*anything):
+        delattr(robot, name)
+        raise way_out(3)
+
+    setattr(robot, name, exits)
+    report = crossing(robot)
+    assert report.ending is Ending.INTERNAL
+    assert way_out.__name__ in report.fault
+    assert len(stops) == 1
+
+
+def test_a_robot_that_cannot_be_stopped_is_told():
+    class Rolls(GridRobot):
+        def stop(self):
+            raise OSError("no brakes")
+
+    report = crossing(grid_robot(Rolls))
+    assert report.ending is Ending.REACHED
+    assert "the robot could not be stopped: OSError: no brakes" in report.fault
+
+
+def test_energy_that_is_no_number_at_last_is_that_of_the_frames_and_named():
+    class Forgets(GridRobot):
+        stopped = False
+
+        def stop(self):
+            super().stop()
+            self.stopped = True
+
+        def situation(self):
+            told = super().situation()
+            return replace(told, energy=math.nan) if self.stopped else told
+
+    report, sound = crossing(grid_robot(Forgets)), crossing(grid_robot())
+    assert "energy = nan" in report.fault
+    assert report.energy == pytest.approx(sum(frame.energy for frame in sound.frames))
+    assert math.isfinite(report.net)
+
+
+@pytest.mark.parametrize("length", [math.nan, math.inf, -1.0, None, "far"])
+def test_a_story_of_impossible_lengths_is_named_in_missions_and_calibrations(length):
+    class Boasts(GridRobot):
+        def story(self):
+            return {**super().story(), "length": length}
+
+    assert "the robot's story says length = " in crossing(grid_robot(Boasts)).fault
+    contracts = compiled_contracts(PROGRAM)
+    with pytest.raises(AnytimeError, match=r"a mission of calibration ended: .* length = "):
+        measure_rhythm(PROGRAM, MISSION, contracts, lambda: grid_robot(Boasts), seeds=[0])
+
+
+def test_what_is_no_robot_mission_program_or_policy_is_refused_before_anything_moves():
+    class Half:
+        clock = WorkClock(REFERENCE)
+
+        def inputs(self): ...
+
+    with pytest.raises(AnytimeError, match="a Half, has no situation, begin"):
+        crossing(Half())
+    with pytest.raises(AnytimeError, match="the mission is a str"):
+        crossing(grid_robot(), mission="office")
+    with pytest.raises(AnytimeError, match="the program is a Constant"):
+        Monitor(STEADY, PROGRAM)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(AnytimeError, match="the policy is 7"):
+        Monitor(PROGRAM, 7)  # pyright: ignore[reportArgumentType]
+    with pytest.raises(AnytimeError, match="seed is 'a'"):
+        Monitor(PROGRAM, STEADY).run(MISSION, grid_robot(), seed="a")  # pyright: ignore[reportArgumentType]
+
+
+@pytest.mark.parametrize(
+    ("decision", "reason"),
+    [
+        (None, "it gives None, no Decision"),
+        (Decision({"see": -1.0, "find_path": 1.0}, 1.0), "it gives -1.0 s to 'see'"),
+        (Decision({"see": 1.0, "find_path": 1.0}, 0.0), "its speed is 0.0"),
+        (Decision({"see": 1.0, "find_path": 1.0}, 1.0, why=None), "its reason is None"),  # pyright: ignore[reportArgumentType]
+    ],
+)
+def test_a_decision_that_cannot_be_carried_out_is_named(decision, reason):
+    assert reason in crossing(grid_robot(), policy=lambda state: decision).fault
+
+
+def test_a_robot_that_never_moves_is_blocked_though_the_task_never_ends(monkeypatch):
+    class Stuck(GridRobot):
+        def begin(self, plan, speed): ...
+        def avoid(self, speed): ...
+
+    monkeypatch.setattr("monitor.monitoring.UNMOVED", 50)
+    endless = replace(MISSION, value=Value("exponential", 100.0, 200.0))
+    report = crossing(grid_robot(Stuck), mission=endless)
+    assert report.ending is Ending.BLOCKED
+    assert len(report.frames) == 50
 
 
 def test_a_class_is_no_robot():

@@ -86,6 +86,21 @@ class Cart:
         return {}
 
 
+class TellsNothing(Cart):
+    def story(self):
+        return None
+
+
+class KnowsNoEnergy(Cart):
+    def situation(self):
+        return Situation(float("nan"), 1.0, 1.0)
+
+
+class SaysHowItEnds(Cart):
+    def situation(self):
+        return Situation(0.0, 0.0, 0.0, ending="reached")  # pyright: ignore[reportArgumentType]
+
+
 class EndsAtOnce(Cart):
     def situation(self):
         return Situation(0.0, 0.0, 0.0, ending=Ending.REACHED)
@@ -137,6 +152,9 @@ def test_a_cart_that_keeps_its_contract_passes():
 @pytest.mark.parametrize(
     ("robot", "check", "told"),
     [
+        (TellsNothing, testing.tells_what_can_be, "story\\(\\) gives None"),
+        (KnowsNoEnergy, testing.tells_what_can_be, "energy = nan"),
+        (SaysHowItEnds, testing.tells_what_can_be, "ending = 'reached'"),
         (EndsAtOnce, testing.starts_standing, "has ended already"),
         (LooksSlowly, testing.reading_changes_nothing, "only complete and work may"),
         (WaitsInBegin, testing.orders_take_no_time, "must not wait for the robot"),
