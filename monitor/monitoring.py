@@ -81,12 +81,10 @@ class Monitor:
                 ending = Ending.ABORTED
             except ConnectionError as error:
                 ending, fault = Ending.LINK_LOST, str(Fault.of(error))
-            except BaseException as error:  # a robot that exits must be stopped too
+            except (Exception, SystemExit, GeneratorExit) as error:
                 ending, fault = Ending.INTERNAL, str(Fault.of(error))
-            try:
-                robot.stop()
-            except (Exception, SystemExit) as error:
-                life.failures.note(f"the robot could not be stopped: {Fault.of(error)}")
+            finally:  # whatever else leaves it
+                life.stop()
             return life.report(ending, fault)
 
 
@@ -350,6 +348,13 @@ class _Life:
         if self.monitor.rhythm is None or label not in plans:
             return None
         return self.monitor.rhythm.advertised(results[self.monitor.program.labels[0]].elapsed)
+
+    def stop(self) -> None:
+        """Let the robot stand still; one that cannot even do that is told."""
+        try:
+            self.robot.stop()
+        except (Exception, SystemExit, GeneratorExit) as error:
+            self.failures.note(f"the robot could not be stopped: {Fault.of(error)}")
 
     def report(self, ending: Ending, fault: str) -> Report:
         seconds = self.time()

@@ -157,6 +157,25 @@ def test_a_robot_that_exits_is_stopped_and_what_was_lived_is_told(name, way_out)
     assert len(stops) == 1
 
 
+def test_what_is_none_of_these_leaves_the_mission_once_the_robot_stands():
+    class Foreign(BaseException):
+        pass
+
+    class Raises(GridRobot):
+        stops = 0
+
+        def complete(self):
+            raise Foreign
+
+        def stop(self):
+            self.stops += 1
+
+    robot = grid_robot(Raises)
+    with pytest.raises(Foreign):
+        crossing(robot)
+    assert robot.stops == 1
+
+
 def test_a_robot_that_cannot_be_stopped_is_told():
     class Rolls(GridRobot):
         def stop(self):
