@@ -36,7 +36,8 @@ Listener = Callable[[Frame], None]
 class Monitor:
     """Runs missions of a robot with a compiled program and a policy.
 
-    `decide` is pure: the same state, the same decision. `run` is a loop over it and never raises.
+    `decide` is pure: the same state, the same decision. `run` is a loop over it, which nothing
+    leaves that a module, a robot or the policy raises.
     """
 
     program: CompiledProgram

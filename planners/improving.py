@@ -27,7 +27,7 @@ from planners.search import (
     WALL,
 )
 
-CALLED = "525505352c65"
+CALLED = "2386ccea179b"
 
 DONE = 0
 BUCKETS = 1 << 13

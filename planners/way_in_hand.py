@@ -25,7 +25,7 @@ from planners.improving import (
 from planners.norms import expected_norm, least_norm
 from planners.search import ACROSS, DIAGONAL, DOWN, SPAN, STEP, STRAIGHT
 
-CALLED = "349f6a1cdc66"
+CALLED = "5dd93ea6e770"
 
 _WINDOW_BUDGET = 4000  # expansions after which a window is given up
 
@@ -74,22 +74,20 @@ def so_far(cost, wall, columns, start, diagonals, run, known):
     """The way in hand, known to cost so much, or what a search that has beaten it, and still goes
     on, has made of it so far: its cells as `cells_of` a plan, and its cost."""
     count, node, path = run.state[COUNT], run.state[MEETING], run.path
-    if node < 0:
-        cells, diagonal = cells_of(path[:count], columns, 1)
-        return cells, diagonal, known
-    # Labels that were corrected since may have made it even shorter than was told.
-    beginning, length = way_to(cost, wall, columns, start, node, diagonals, run)
-    if count == 0 or node == path[count - 1]:
-        cells, diagonal = cells_of(beginning, columns, 1)
-        return cells, diagonal, length
-    rest = count - 1  # its last visit, should the way go in a circle
-    while path[rest] != node:
-        rest -= 1
-    way = with_room(beginning, beginning.size, beginning.size + count - rest - 1)
-    for place in range(rest + 1, count):
-        way[beginning.size + place - rest - 1] = path[place]
+    way, length = path[:count], known
+    if node >= 0:
+        # Labels that were corrected since may have made it even shorter than was told.
+        way, length = way_to(cost, wall, columns, start, node, diagonals, run)
+        if count > 0 and node != path[count - 1]:
+            length += _left(run, node)
+            first, rest = way.size, count - 1  # its last visit, should the way go in a circle
+            while path[rest] != node:
+                rest -= 1
+            way = with_room(way, first, first + count - rest - 1)
+            for place in range(rest + 1, count):
+                way[first + place - rest - 1] = path[place]
     cells, diagonal = cells_of(way, columns, 1)
-    return cells, diagonal, length + _left(run, node)
+    return cells, diagonal, length
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -17,6 +17,8 @@ CALLEES = {
     "region_search",
     "refining",
     "improving",
+    "norms",
+    "prefetching",
     "tracing",
 }
 CALLEES |= {"query.header", "query.choosing", "query.varying"}
