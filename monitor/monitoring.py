@@ -362,10 +362,8 @@ class _Life:
         energy = sum(frame.energy for frame in self.frames)
         try:
             energy = checked(self.robot.situation()).energy
-        except AnytimeError as error:  # else what is known of the frames that ended
+        except Exception as error:  # then what is known of the frames that ended
             self.failures.note(str(Fault.of(error)))
-        except Exception:  # of a link that is lost, for one
-            pass
         reached = ending is Ending.REACHED
         return Report(
             mission=self.mission.name,
@@ -380,5 +378,5 @@ class _Life:
             job=self.job,
             frames=tuple(self.frames),
             machine=self.monitor.program.machine,
-            fault="; ".join(filter(None, (fault, *self.failures.notes))),
+            fault="; ".join(dict.fromkeys(filter(None, (fault, *self.failures.notes)))),
         )

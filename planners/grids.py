@@ -35,7 +35,7 @@ BELIEVED = _odds_costs()
 """Cost of a cell by its probability of being blocked, by the odds; certain obstacles are walls."""
 
 
-_regions = Pool(new_regions)  # to make them anew takes a tenth of the time of a first plan
+_regions = Pool(new_regions)  # those of a new map would have to get their pages from the system
 
 
 class Grid:
