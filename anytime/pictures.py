@@ -11,6 +11,7 @@ BARS = "▁▂▃▄▅▆▇█"
 # Okabe & Ito's colours, told apart by colour-blind eyes; every series is labelled as well.
 COLOURS = ("#0072b2", "#e69f00", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#f0e442", "#000000")
 COLUMNS = 100  # of what is printed, at most
+_LONG = 1e6  # from which on a number is a power of ten: its digits would take a line
 
 
 def sparkline(values: Sequence[float], low: float = 0.0, high: float = 1.0) -> str:
@@ -34,13 +35,15 @@ def thinned(values: Sequence[float], most: int) -> Sequence[float]:
 
 
 def number(value: float) -> str:
-    """A quality or share in few characters: .81, 1.00, 12.3."""
+    """A quality or share in few characters: .81, 1.00, 12.3, 4.5e+08."""
     if math.isnan(value):
         return "—"
     if abs(value) < 1:
         text = f"{value:.2f}"
         return text if text == "1.00" else text.replace("0.", ".", 1)
-    return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}"
+    if abs(value) < _LONG:
+        return f"{value:.2f}" if abs(value) < 10 else f"{value:.1f}"
+    return f"{value:.3g}"
 
 
 def clipped(line: str) -> str:
@@ -69,7 +72,7 @@ def duration(seconds: float) -> str:
         return f"{1e6 * seconds:.0f} µs" if seconds else "0 ms"
     if abs(seconds) < 0.99995:
         return f"{1e3 * seconds:.1f} ms"
-    return f"{seconds:.2f} s"
+    return f"{seconds:.2f} s" if abs(seconds) < _LONG else f"{seconds:.3g} s"
 
 
 def line_chart(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from anytime.machine_code import njit
 from compiler.ordering import ALONG
 
 Floats = NDArray[np.float64]

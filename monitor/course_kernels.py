@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from anytime.machine_code import njit
 
 Floats = NDArray[np.float64]
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def best_speed(
     now: float,
     left: float,
@@ -63,7 +64,7 @@ def best_speed(
     return top / len(walked), chosen
 
 
-@numba.njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True)
 def solve(
     value: Floats,
     tick: float,

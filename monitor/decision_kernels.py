@@ -6,7 +6,8 @@ A layer is [F + 1, X, Y]: frames still to plan, cells of path left, level of the
 """
 
 import numpy as np
-from numba import njit
+
+from anytime.machine_code import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 import anytime
 from anytime.errors import AnytimeError
+from anytime.machine_code import njit
 from planners.atp import GRAIN
 from planners.frontier import cells_of, least_way, next_base, path_to, pop, sift_up, way_cost
 from planners.grids import Grid, endpoints
@@ -25,7 +25,7 @@ from planners.path_finding import Cell, percent_of
 from planners.problems import known_floors, walked_quality
 from planners.search import DIAGONAL, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "a8b7af0524ff"
+CALLED = "5afabff1aa83"
 
 WEIGHTS = (3.0, 2.5, 2.0, 1.5, 1.4, 1.3, 1.2, 1.1, 1.05, 1.02, 1.0)
 """Weights of the heuristic, one after the other."""

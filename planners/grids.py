@@ -6,10 +6,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from anytime.errors import AnytimeError
+from anytime.machine_code import njit
 from planners.blocks import SIDE, UNKNOWN, Regions, forget, new_regions
 from planners.landmarks import Landmarks
 from planners.map_features import features
@@ -18,7 +18,7 @@ from planners.pool import Pool
 from planners.refining import FULL
 from planners.search import WALL
 
-CALLED = "d38d53e59e74"
+CALLED = "856a7d970f15"
 
 _DEAREST = 250  # cost of the dearest believed obstacle
 _PASSABLE = 5  # a cell that is as likely free as blocked costs this much

@@ -16,9 +16,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from anytime.machine_code import njit
 from planners.blocks import EXPANDED, MOST, STREAMED, TOUCHED, UNKNOWN, Regions, region_of
 from planners.frontier import way_cost
 from planners.region_search import (
@@ -33,7 +33,7 @@ from planners.region_search import (
 from planners.search import OUT_OF_BUDGET, SPAN
 from planners.tracing import connect, pins_along
 
-CALLED = "90658d7752f5"
+CALLED = "3a950d31c499"
 
 _EVERYWHERE = -2  # the goal's region of a search that goes on until it has been everywhere
 _GRAIN = 1000 * EXPANDED  # work of such a search between two steps …

@@ -1,12 +1,12 @@
 """What tells an easy map from a hard one: how much of it is blocked, and in how large pieces."""
 
 import numpy as np
-from numba import njit
 
+from anytime.machine_code import njit
 from planners.blocks import ALL, FIRST_COLUMN, LAST_ROW, SIDE, pack
 from planners.frontier import NOT_LAST, ONE, SIDE_BITS
 
-CALLED = "b7ddc203ddea"
+CALLED = "af596e9a0ace"
 
 _TWOS, _FOURS = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
 _EIGHTS = np.uint64(0x0F0F0F0F0F0F0F0F)

@@ -8,11 +8,11 @@ punishes small detours at some and hardly any at others.
 """
 
 import numpy as np
-from numba import njit
 
+from anytime.machine_code import njit
 from planners.search import DIAGONAL, STRAIGHT
 
-CALLED = "525505352c65"
+CALLED = "a205cc50c874"
 
 _SLOPES = np.array([0.0, 0.3, 0.6, 1.0])
 _DENSITIES = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.33, 0.35, 0.37])

@@ -10,11 +10,11 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 import anytime
 from anytime.errors import AnytimeError
+from anytime.machine_code import njit
 from planners.grids import BELIEVED
 from planners.multipath import MultiPath, Step
 from planners.path_finding import Cell, index_of
@@ -34,7 +34,7 @@ from planners.refining import (
 )
 from planners.search import DIAGONAL, STRAIGHT, workspace
 
-CALLED = "d3b5951e77ea"
+CALLED = "c08f699498be"
 
 HIGHEST_LEVEL = 3
 """The paper's Lmax."""

@@ -3,14 +3,14 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from anytime.machine_code import njit
 from planners.frontier import octile, path_to, with_room
 from planners.search import WALL
 from planners.windows import ENDLESS, IMPASSABLE, YES, ZERO, window_search
 
-CALLED = "3937f6faed97"
+CALLED = "6311bb2ea748"
 
 # A plan in refinement. A segment is a row of `segment`; its cells lie in `cell`, flat indices on
 # its own level; segments meet in joints, each as fine as the finest segment that it bounds.

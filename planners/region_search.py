@@ -13,15 +13,15 @@ nothing has to be cleared.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from anytime.machine_code import njit
 from planners.arrays import zeroed
 from planners.blocks import EXPANDED, MOST, SIDE, TOUCHED, UNKNOWN, part, region_of
 from planners.frontier import detour, flood, is_clear, least_way, next_base
 from planners.search import DIAGONAL, NO_PATH, OUT_OF_BUDGET, SPAN, STRAIGHT
 
-CALLED = "b7ddc203ddea"
+CALLED = "af596e9a0ace"
 
 FOUND = 0
 BUCKETS, NOTHING, FINE = 1 << 13, -1, 9

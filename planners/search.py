@@ -14,9 +14,9 @@ from threading import local
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from anytime.machine_code import njit
 from planners.arrays import zeroed
 
 STRAIGHT, DIAGONAL = 10_000, 14_142

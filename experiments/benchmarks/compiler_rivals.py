@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from anytime.machine_code import njit
 from compiler.elimination import Factor
 
 

@@ -70,9 +70,15 @@ NO_MEMORY = Memory()
 
 
 def user_memory() -> Memory:
-    """The user's own: in the folder `$ANYTIME_CACHE`, or in `anytime` of the user's caches."""
-    caches = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Memory(Path(os.environ.get("ANYTIME_CACHE") or Path(caches) / "anytime") / "lessons")
+    """The user's own: in the folder `$ANYTIME_CACHE`, or in `anytime` of the user's caches; none
+    for a user without a home."""
+    folder = os.environ.get("ANYTIME_CACHE")
+    if not folder:
+        caches = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+        if not os.path.isabs(caches):  # the system knows no home of this user
+            return NO_MEMORY
+        folder = os.path.join(caches, "anytime")
+    return Memory(Path(folder) / "lessons")
 
 
 def code_digest() -> bytes:

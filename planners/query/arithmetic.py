@@ -14,8 +14,10 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
+
+from anytime.machine_code import njit
 
 
 def _checked(function: Callable[[float], float], overflows: bool) -> Any:

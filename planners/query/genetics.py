@@ -30,7 +30,7 @@ from planners.query.header import (
 )
 from planners.query.varying import blend, cloud, edit_choices, is_continuous, mix, shift
 
-CALLED = "d0c87ac4e456"
+CALLED = "ca6a83d29a26"
 
 _U, _S32 = np.uint64, np.uint64(32)
 _AFTER_CHANGE = 0.005  # a cloud's step at least, in spreads, when the world has changed

@@ -21,10 +21,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import from_dtype, njit, types
+from numba import from_dtype, types
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic, models, overload, overload_method, register_model
 
+from anytime.machine_code import njit
 from planners.query import arithmetic, choosing, header
 from planners.query.errors import NativeError
 from planners.query.reading import Function, Text

@@ -14,8 +14,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from anytime.machine_code import njit
 from planners.query.choosing import (
     EXPONENTIAL,
     GAUSSIAN,

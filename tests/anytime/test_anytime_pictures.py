@@ -72,6 +72,12 @@ def test_durations_are_short(seconds, text):
     assert duration(seconds) == text
 
 
+@given(st.floats(allow_nan=True))
+def test_no_number_and_no_duration_takes_a_line(value):
+    assert len(number(value)) <= 10
+    assert len(duration(value)) <= 12
+
+
 # XML 1.0 has no control characters, surrogates or non-characters.
 texts = st.text(st.characters(exclude_categories=("Cc", "Cs", "Cn")), max_size=30)
 

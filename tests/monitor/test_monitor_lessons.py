@@ -1,11 +1,12 @@
 """What a mission taught is kept, is found again, and is never wrong for long."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
 
 from monitor.robots import lessons
-from monitor.robots.lessons import KEPT, NO_MEMORY, Memory
+from monitor.robots.lessons import KEPT, NO_MEMORY, Memory, user_memory
 
 
 @dataclass(frozen=True)
@@ -68,3 +69,12 @@ def test_old_lessons_make_room(memory):
 
 def test_without_a_folder_everything_is_learnt_anew():
     assert NO_MEMORY.recall("way", b"a floor", Lesson, lambda: LESSON) is LESSON
+
+
+def test_a_user_without_a_home_has_no_memory(monkeypatch):
+    for name in ("ANYTIME_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    assert user_memory() is NO_MEMORY
+    monkeypatch.setenv("ANYTIME_CACHE", "here")
+    assert user_memory() == Memory(Path("here") / "lessons")
