@@ -7,6 +7,7 @@ import contextlib
 import importlib.util
 import json
 import math
+import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -83,17 +84,33 @@ def natural(text: str) -> int:
 
 
 def folder(text: str) -> Path:
-    """A folder to read or to make, as an argument."""
+    """A folder to read, as an argument."""
     if Path(text).exists() and not Path(text).is_dir():
         raise argparse.ArgumentTypeError(f"{text} is a file; give a folder")
     return Path(text)
+
+
+def destination(text: str) -> Path:
+    """A folder to write to or to make, as an argument: found out before there is anything that
+    could be lost."""
+    place = folder(text)
+    _may_be_written(place)
+    return place
 
 
 def target(text: str) -> Path:
     """A file to write, as an argument."""
     if Path(text).is_dir():
         raise argparse.ArgumentTypeError(f"{text} is a folder; give a file")
+    if Path(text).is_file() or not Path(text).exists():  # else a pipe or a device
+        _may_be_written(Path(os.path.realpath(text)).parent)
     return Path(text)
+
+
+def _may_be_written(place: Path) -> None:
+    there = next(each for each in (place, *place.absolute().parents) if each.exists())
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise argparse.ArgumentTypeError(f"{there} cannot be written; give a folder that can")
 
 
 def resolve(reference: str) -> Any:

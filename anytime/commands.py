@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from anytime.command_line import (
     Answer,
     add_command,
+    destination,
     folder,
     natural,
     positive,
@@ -29,7 +31,7 @@ def declare(commands: Any) -> None:
     """Declare the sub-commands."""
     parser = add_command(commands, "profile", profile, "measure modules and fill a library")
     parser.add_argument("module", nargs="+", help="a registered name or FILE.py:NAME")
-    _add_library(parser)
+    _add_library(parser, destination)
     parser.add_argument(
         "--runs", type=natural, metavar="N", help=f"problems, at most (default {RUNS}, or {MOST})"
     )
@@ -67,8 +69,8 @@ def declare(commands: Any) -> None:
     parser.add_argument(
         "-o",
         "--output",
-        type=folder,
-        default=Path("calibrated"),
+        type=destination,
+        default="calibrated",
         metavar="DIR",
         help="for the library on this machine (default: calibrated)",
     )
@@ -79,13 +81,13 @@ def declare(commands: Any) -> None:
         "file", nargs="+", type=Path, help=".profile, .schedule, .jsonl, or a folder of them"
     )
     parser.add_argument(
-        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="default: here"
+        "-o", "--output", type=destination, default=".", metavar="DIR", help="default: here"
     )
 
 
-def _add_library(parser: argparse.ArgumentParser) -> None:
+def _add_library(parser: argparse.ArgumentParser, kind: Callable[[str], Path] = folder) -> None:
     parser.add_argument(
-        "--library", type=folder, default=Path("profiles"), metavar="DIR", help="default: profiles"
+        "--library", type=kind, default="profiles", metavar="DIR", help="default: profiles"
     )
 
 

@@ -24,7 +24,8 @@ def _find_place() -> None:
         # Nobody else may write there: numba unpickles what it finds.
         folder = tempfile.mkdtemp(prefix="anytime-machine-code-")
         atexit.register(_remove, folder, os.getpid())
-        config.CACHE_DIR = os.environ["NUMBA_CACHE_DIR"] = folder
+        os.environ["NUMBA_CACHE_DIR"] = folder
+        config.CACHE_DIR = folder  # pyright: ignore[reportAttributeAccessIssue]
         warnings.warn(
             "machine code is compiled anew, which takes a minute: neither the folder of its source "
             "nor a home can be written; set NUMBA_CACHE_DIR to one that can, to keep it",

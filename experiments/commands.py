@@ -8,7 +8,7 @@ import platform
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command, folder, natural, progress
+from anytime.command_line import Answer, add_command, destination, natural, progress
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def declare(commands: Any) -> None:
     parser.add_argument("--seed", type=natural, default=0, help="of the profiles and the page")
     parser.add_argument("--mission", type=Path, metavar="MISSION.toml", help="default: the office")
     parser.add_argument(
-        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="default: here"
+        "-o", "--output", type=destination, default=".", metavar="DIR", help="default: here"
     )
     parser = add_command(commands, "bench", bench, "a benchmark: " + ", ".join(BENCHMARKS))
     parser.add_argument("name", choices=BENCHMARKS)
@@ -55,7 +55,7 @@ def declare(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=natural, default=0, help="of everything random")
     parser.add_argument(
-        "-o", "--output", type=folder, metavar="DIR", help="for pictures, of those that draw"
+        "-o", "--output", type=destination, metavar="DIR", help="for pictures, of those that draw"
     )
     parser = add_command(
         commands, "reproduce", reproduce, "the papers' claims, and rivals, beside our figures"
@@ -69,7 +69,7 @@ def declare(commands: Any) -> None:
     )
     parser.add_argument("--seed", type=natural, default=0, help="of the first draw")
     parser.add_argument(
-        "-o", "--output", type=folder, default=Path(), metavar="DIR", help="of the page"
+        "-o", "--output", type=destination, default=".", metavar="DIR", help="of the page"
     )
     add_command(commands, "warm-up", warm_up, "compile the kernels, so that the first call is fast")
 

@@ -8,7 +8,16 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from anytime.command_line import Answer, add_command, folder, natural, positive, progress, target
+from anytime.command_line import (
+    Answer,
+    add_command,
+    destination,
+    folder,
+    natural,
+    positive,
+    progress,
+    target,
+)
 from anytime.errors import AnytimeError
 
 if TYPE_CHECKING:
@@ -57,8 +66,8 @@ def declare(commands: Any) -> None:
     )
     parser.add_argument(
         "--log",
-        type=folder,
-        default=Path("anytime-run"),
+        type=destination,
+        default="anytime-run",
         metavar="DIR",
         help="for the log and the page (default anytime-run)",
     )

@@ -15,7 +15,7 @@ from hypothesis import strategies as some
 
 from anytime import AnytimeError, commands
 from anytime.__main__ import main
-from anytime.command_line import folder, natural, resolve, target
+from anytime.command_line import destination, folder, natural, resolve, target
 from anytime.library import read_profile
 
 
@@ -40,6 +40,17 @@ def test_a_file_is_no_folder_and_a_folder_no_file(tmp_path):
         folder(str(file))
     with pytest.raises(argparse.ArgumentTypeError, match="is a folder"):
         target(str(tmp_path))
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_done(tmp_path, monkeypatch):
+    device = Path(os.devnull)
+    monkeypatch.setattr(os, "access", lambda place, mode: False)  # root may write everywhere
+    for kind, place in ((destination, tmp_path / "a" / "b"), (target, tmp_path / "file")):
+        with pytest.raises(argparse.ArgumentTypeError, match=f"{tmp_path} cannot be written"):
+            kind(str(place))
+    assert folder(str(tmp_path)) == tmp_path
+    assert target(str(device)) == device
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_file_is_imported_once_so_that_its_classes_are_the_same(tmp_path):

@@ -12,7 +12,8 @@ SOURCE = Path(anytime.__file__).parent / "machine_code.py"
 KERNEL = """
 import os, machine_code
 double = machine_code.njit(cache=True)(lambda x: 2 * x)
-print(double(21), os.environ["NUMBA_CACHE_DIR"], len(list(os.scandir(os.environ["NUMBA_CACHE_DIR"]))))
+folder = os.environ["NUMBA_CACHE_DIR"]
+print(double(21), folder, len(os.listdir(folder)))
 """
 
 
