@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import sys
 import tempfile
@@ -22,6 +23,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Exit codes: 0 done, 1 the mission was not reached or a goal was missed, 2 bad input, 130
     interrupted, 70 a bug of ours (with the path of a report).
     """
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal may know fewer characters than we use
+        sys.stdout.reconfigure(errors="replace")
     parser = Parser(prog="anytime", description="Anytime computation for robots.")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for point in plugins.registered("anytime.commands").values():
@@ -62,7 +65,7 @@ def _bug(error: Exception) -> int:
 
 def _report() -> str:
     with tempfile.NamedTemporaryFile(
-        "w", prefix="anytime-crash-", suffix=".txt", delete=False
+        "w", prefix="anytime-crash-", suffix=".txt", delete=False, encoding="utf-8"
     ) as file:
         traceback.print_exc(file=file)
     return file.name

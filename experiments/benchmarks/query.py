@@ -165,13 +165,13 @@ def _start(settings: dict) -> np.ndarray:
 
     What starts the compiler, whatever it then compiles or loads, is told apart, like the imports.
     """
-    source = Path(sys.modules["planners.nao_plan"].__file__ or "").read_text()
+    source = Path(sys.modules["planners.nao_plan"].__file__ or "").read_text("utf-8")
     cold: list[float] = []
     cached: list[float] = []
     engine: list[float] = []
     for _ in range(3):
         with tempfile.TemporaryDirectory() as folder:
-            Path(folder, "model.py").write_text(source)
+            Path(folder, "model.py").write_text(source, "utf-8")
             for times in (cold, cached):
                 environment = {**os.environ, "PYTHONPATH": os.pathsep.join([folder, *sys.path])}
                 done = subprocess.run(

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as some
 
+import experiments
 from anytime import AnytimeError, commands
 from anytime.__main__ import main
 from anytime.command_line import destination, folder, natural, resolve, target
@@ -135,6 +136,18 @@ def test_every_profile_of_a_folder_is_drawn(tmp_path, capsys):
     shutil.copytree(kept, other)
     assert main(["plot", str(kept), str(other), "-o", str(tmp_path)]) == 2
     assert "would both be drawn as" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
+def test_a_terminal_that_knows_few_characters_gets_what_it_knows(encoding):
+    shipped = Path(experiments.__file__).parent / "data" / "profiles"
+    ran = subprocess.run(
+        [sys.executable, "-m", "anytime", "library", "--library", str(shipped)],
+        env={**os.environ, "PYTHONIOENCODING": encoding},
+        capture_output=True,
+        check=True,
+    )
+    assert "find_path" in ran.stdout.decode(encoding)
 
 
 def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys):
