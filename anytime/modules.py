@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -14,6 +15,7 @@ from anytime.knobs import MOST, Knob, setting_name, settings
 
 Score = Callable[..., float]
 FILLED = ("seconds", "rng", "memory")
+_POSIX = os.name == "posix"
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,11 @@ def module(
                 f"module {label!r} has too many settings; at most {MOST} are measured"
             )
         is_generator = inspect.isgeneratorfunction(inspect.unwrap(function))
+        if isolated and not _POSIX:
+            raise AnytimeError(
+                f"module {label!r} is isolated, for which this system lacks what cuts a process; "
+                "it takes Linux or macOS"
+            )
         if isolated and "memory" in filled:
             raise AnytimeError(
                 f"module {label!r} is isolated and has a memory; a worker may die at any time, so "

@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 
 import anytime
-from anytime import AnytimeError, Deadline, Machine, Status, WallClock, WorkClock, isolation, naming
+from anytime import (
+    AnytimeError,
+    Deadline,
+    Machine,
+    Status,
+    WallClock,
+    WorkClock,
+    isolation,
+    modules,
+    naming,
+)
 from anytime.isolation import HUNG
 from anytime.modules import Limits
 from anytime.running import execute
@@ -321,6 +331,12 @@ def test_a_module_that_no_other_process_can_find_is_refused_at_once():
         @anytime.module(isolated=True)
         def hidden():
             yield 1
+
+
+def test_where_processes_cannot_be_cut_an_isolated_module_is_refused(monkeypatch):
+    monkeypatch.setattr(modules, "_POSIX", False)
+    with pytest.raises(AnytimeError, match="it takes Linux or macOS"):
+        anytime.module(isolated=True)(_remembers)
 
 
 def test_an_isolated_module_has_no_memory():
