@@ -64,10 +64,15 @@ def _bug(error: Exception) -> int:
 
 
 def _report() -> str:
-    with tempfile.NamedTemporaryFile(
-        "w", prefix="anytime-crash-", suffix=".txt", delete=False, encoding="utf-8"
-    ) as file:
-        traceback.print_exc(file=file)
+    """Where the traceback is: in a file, or above where none can be made."""
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="anytime-crash-", suffix=".txt", delete=False, encoding="utf-8"
+        ) as file:
+            traceback.print_exc(file=file)
+    except OSError:
+        traceback.print_exc()
+        return "above"
     return file.name
 
 

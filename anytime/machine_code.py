@@ -16,20 +16,26 @@ import warnings
 from numba import config
 from numba import njit as njit
 
+from anytime.errors import AnytimeError
+
+_NOWHERE = "machine code cannot be kept: neither the folder of its source nor a home can be written"
+_CURE = "set NUMBA_CACHE_DIR to a folder that can"
+
 
 def _find_place() -> None:
     try:
         njit(cache=True)(lambda: None)
     except RuntimeError:  # "no locator available"
         # Nobody else may write there: numba unpickles what it finds.
-        folder = tempfile.mkdtemp(prefix="anytime-machine-code-")
+        try:
+            folder = tempfile.mkdtemp(prefix="anytime-machine-code-")
+        except OSError as error:
+            raise AnytimeError(f"{_NOWHERE}; {_CURE}") from error
         atexit.register(_remove, folder, os.getpid())
         os.environ["NUMBA_CACHE_DIR"] = folder
         config.CACHE_DIR = folder  # pyright: ignore[reportAttributeAccessIssue]
         warnings.warn(
-            "machine code is compiled anew, which takes a minute: neither the folder of its source "
-            "nor a home can be written; set NUMBA_CACHE_DIR to one that can, to keep it",
-            stacklevel=2,
+            f"{_NOWHERE}; it is compiled anew, which takes a minute ({_CURE})", stacklevel=2
         )
 
 

@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -161,6 +162,11 @@ def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys
     report = Path(told.split("report: ")[1].strip())
     assert "ZeroDivisionError: of ours" in report.read_text()
     report.unlink()
+    monkeypatch.setattr(tempfile, "tempdir", f"{os.devnull}/no")
+    assert main(["doctor"]) == 70
+    told = capsys.readouterr().err
+    assert "ZeroDivisionError: of ours" in told
+    assert told.endswith("report: above\n")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
