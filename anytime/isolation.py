@@ -15,7 +15,7 @@ from anytime.clocks import WallClock
 from anytime.errors import AnytimeError
 from anytime.mail import ClosedError
 from anytime.results import Fault
-from anytime.worker_letters import BEGUN, DONE, GO, JOB, LEAVE, POST, POSTED, STOP, Job
+from anytime.worker_letters import BEGINS, BEGUN, DONE, GO, JOB, LEAVE, POST, POSTED, STOP, Job
 
 if TYPE_CHECKING:
     from anytime.mail import Letter
@@ -156,7 +156,7 @@ class _Isolated:
             while (letter := self._heard()) is not None:
                 self.begun = True
                 if letter.kind == BEGUN:
-                    self.run.begin()
+                    self.run.begin(self._moment(*BEGINS.unpack(letter.content)))
                     continue
                 if letter.kind in (DONE, LEAVE):
                     complete, fault = pickle.loads(letter.content)
@@ -245,10 +245,14 @@ class _Isolated:
     def _adopt(self, content: bytes) -> None:
         """Take over a check-point that the worker's clock has counted."""
         at, seen, charges, value = self._read(content)
-        at = min(max(at, self.run.started), self.run.deadline.clock.now())
+        at = self._moment(at)
         self.run.adopt(at, charges)
         if value is not None:
             self.run.keep(self._seen(value), seen, at)
+
+    def _moment(self, at: float) -> float:
+        """A time that the worker says, within the run."""
+        return min(max(at, self.run.started), self.run.deadline.clock.now())
 
     def _replay(self, content: bytes) -> None:
         """Let a check-point happen on this side's clock."""

@@ -99,9 +99,9 @@ class Run:
         if self._observe is not None:
             self._observe(value, change)
 
-    def begin(self) -> None:
-        """The module begins now: the time until then was no step of it."""
-        self._last_step = self.deadline.clock.now()
+    def begin(self, at: float) -> None:
+        """The module begins in another process: the time until then was no step of it."""
+        self._last_step = at
 
     def adopt(self, at: float, charges: Sequence[float]) -> None:
         """Take over a check-point that another process has counted, and when it was."""

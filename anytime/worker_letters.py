@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 READY, JOB, BEGUN, POST, LAST, STOP, GO, DONE, LEAVE = (bytes([code]) for code in b"RJBPLSGDA")
+BEGINS = struct.Struct("<d")
+"""Of a beginning: its time on `time.perf_counter`, as the caller may read of it late."""
 POSTED = struct.Struct("<d?dI")
 """Of a check-point: time, whether there is a value, its estimate or NaN, the number of charges."""
 GRACE = 0.1

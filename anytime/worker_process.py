@@ -28,6 +28,7 @@ from anytime.modules import Module
 from anytime.results import Fault
 from anytime.running import RECENT, Run, perform
 from anytime.worker_letters import (
+    BEGINS,
     BEGUN,
     DONE,
     GRACE,
@@ -180,7 +181,7 @@ def main(descriptor: int, known: list[tuple[str, str, str]]) -> None:
             letter = mailbox.receive(math.inf)
             assert letter is not None
             if letter.kind == JOB:
-                mailbox.send(BEGUN)
+                mailbox.send(BEGUN, BEGINS.pack(time.perf_counter()))
                 fault, complete = _served(letter.content, mailbox, idle)
                 soiled = _left_something()
                 mailbox.send(LEAVE if soiled else DONE, pickle.dumps((complete, fault)))

@@ -1,5 +1,6 @@
 """Modules in worker processes: whatever they do, the caller has the last good result in time."""
 
+import math
 import os
 import pickle
 import signal
@@ -24,8 +25,10 @@ from anytime import (
     naming,
 )
 from anytime.isolation import HUNG
+from anytime.mail import Letter
 from anytime.modules import Limits
-from anytime.running import execute
+from anytime.running import Run, execute
+from anytime.worker_letters import BEGINS, BEGUN, DONE, POST, POSTED
 from anytime.workers import workers
 from experiments.benchmarks import misbehaving
 from experiments.benchmarks.misbehaving import GOOD, MISBEHAVING
@@ -151,6 +154,29 @@ def test_the_start_of_a_worker_is_no_step_of_its_module():
     workers.close()
     _, run = execute(count, (3,), Deadline.after(LEFT))
     assert sum(run.step_seconds) < 0.5 * run.history[-1].seconds
+
+
+class Late:
+    """A worker whose letters lay there for a while: it began at 1 s, had a result at 1.5 s and was
+    done, and it is 4 s now."""
+
+    def __init__(self):
+        told = pickle.dumps((True, None))
+        result = POSTED.pack(1.5, True, math.nan, 0) + pickle.dumps("result")
+        self.letters = [(BEGUN, BEGINS.pack(1.0)), (POST, result), (DONE, told)]
+        self.mailbox = SimpleNamespace(send=lambda *letter, until: None)
+
+    def receive(self, until):
+        return Letter(*self.letters.pop(0))
+
+
+def test_a_step_is_as_long_as_it_was_though_the_caller_hears_of_it_late():
+    now = iter([0.5])
+    clock = SimpleNamespace(now=lambda: next(now, 4.0))
+    run = Run(patient, Deadline(clock, 1e9))
+    assert isolation._Isolated(run, Late(), lambda _: True).live(b"", 1e9) == (True, None)
+    assert run.step_seconds == [0.5]
+    assert [change.seconds for change in run.history] == [1.0]
 
 
 def test_the_start_of_a_worker_is_no_time_of_what_is_measured():
