@@ -15,7 +15,7 @@ LONGEST = 1.0  # seconds for which garbage may be left lying
 def undisturbed(deadline: Deadline) -> Generator[None]:
     """No collection until this is left, if the time is real and short; else as it was.
 
-    What has piled up is collected after it, outside of the contract.
+    What has piled up is collected by and by after it, outside of the contract.
     """
     short = isinstance(deadline.clock, WallClock) and deadline.remaining() <= LONGEST
     if not short or not gc.isenabled():

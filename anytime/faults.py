@@ -133,10 +133,6 @@ def read_schedule(path: Path, known: Mapping[str, Iterable[str]]) -> Schedule:
     return Schedule(faults, stored.seed)
 
 
-def _fault(table: _Table) -> Fault:
-    return Fault(table.kind, table.begins, table.ends, table.what, table.chance)
-
-
 def faulty_module(module: Module, schedule: Schedule, now: Callable[[], float]) -> Module:
     """A module that goes wrong as scheduled; now: seconds since the schedule began."""
     if not module.generator:

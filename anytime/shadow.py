@@ -328,7 +328,8 @@ def _function(shadow: Shadow, watched: Watched, function: Callable[..., Any]) ->
             raise
         call.leave(token)
         with shadow.watching():
-            call.result(value)
+            if value is not None:  # what it registered counts
+                call.result(value)
             call.end(complete=True)
         return value
 
@@ -349,11 +350,16 @@ def _generator(shadow: Shadow, watched: Watched, function: Callable[..., Any]) -
             token = call.enter()
             try:
                 value = inner.send(sent) if thrown is None else inner.throw(thrown)
-            except BaseException as ended:
+            except StopIteration as ended:
                 call.leave(token)
-                call.end(complete=isinstance(ended, StopIteration))
-                if isinstance(ended, StopIteration):
-                    return ended.value
+                with shadow.watching():
+                    if ended.value is not None:
+                        call.result(ended.value)
+                    call.end(complete=True)
+                return ended.value
+            except BaseException:
+                call.leave(token)
+                call.end(complete=False)
                 raise
             call.leave(token)
             with shadow.watching():

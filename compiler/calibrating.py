@@ -24,7 +24,7 @@ RUN = 40  # divisions that are really run to calibrate a program
 RESAMPLED = 8  # budgets at which intervals are found from the tables of some of the problems
 RESAMPLES = 60  # of those tables, at most
 FOLDS = 5  # problems are dealt into; each is promised by divisions chosen on the others
-DIVIDED = 3  # calls at most of programs that are divided anew for each fold
+DIVIDED = 3  # calls and joins at most of programs that are divided anew for each fold
 KNOTS = 96  # budgets at which promises are calibrated; fewer for many calls
 
 

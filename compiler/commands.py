@@ -69,7 +69,7 @@ def explain(options: argparse.Namespace) -> Answer:
 
 
 def advise(options: argparse.Namespace) -> Answer:
-    """Print what each module made twice as fast would be worth."""
+    """Print what each module would be worth if it were faster, better, or a rung longer."""
     from compiler.loading import inspect
 
     found = inspect(options.file).advise(options.seconds)

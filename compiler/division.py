@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 Divisions = tuple[Floats, NDArray[np.intp], Floats]  # seconds [P], moments [P, n], value [P]
 ALL = 1_000_000  # divisions that are weighed at once, at most
 SWEEPS = 4  # of pairwise exchange at each budget, at most
-BUDGETS = 24  # at which programs of more than two calls are searched
+BUDGETS = 24  # at which programs of more divisions are searched
 
 
 @dataclass(frozen=True)

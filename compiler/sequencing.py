@@ -84,7 +84,8 @@ def best_sequence(curve: Curve, survival: Survival, ratio: float = math.inf) -> 
 
 
 def least_ratio(curve: Curve) -> float:
-    """The least acceleration ratio that a sequence can have for this profile, at most 4."""
+    """The least acceleration ratio that a sequence can have for this profile: at most 4, and more
+    only where lengths that were measured lie far apart."""
     following = curve.following
 
     def worth(labels: _Labels, ends: Floats, level: int) -> Floats:

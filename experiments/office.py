@@ -7,13 +7,12 @@ through the core and doors between rooms, so that many ways lead from one end to
 
 from __future__ import annotations
 
-from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
 
-from sensing import GridMap, read_ros_map, write_ros_map
+from sensing import GridMap, write_ros_map
 from sensing.maps import BoolGrid, Cell
 
 ROWS, COLUMNS, RESOLUTION = 160, 240, 0.2
@@ -97,12 +96,6 @@ def draw() -> GridMap:
     begin[START] = True
     reachable = ndimage.binary_propagation(begin, mask=free).astype(bool)
     return GridMap(reachable, resolution=RESOLUTION, name="office")
-
-
-def read_office() -> GridMap:
-    """Read the office that ships with the project."""
-    with as_file(files("experiments") / "data") as folder:
-        return read_ros_map(Path(folder) / "office.yaml")
 
 
 def _clear(free: BoolGrid, area: Area) -> None:

@@ -39,8 +39,8 @@ class Paper:
 class Expected:
     """Maximises the expectation over how missions really went, and again after each call.
 
-    Between frames both contract and speed are chosen; within one the speed, with the contract's
-    remaining seconds.
+    Between frames both contract and speed are chosen. Within one the same is asked from there on,
+    and of the answer the speed is taken: the seconds of the calls stay as they were decided.
     """
 
     mission: Mission

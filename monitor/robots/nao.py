@@ -110,7 +110,7 @@ class NaoRobot:
         return self.body.now()
 
     def wait(self, seconds: float) -> None:
-        """Let time pass, at most a tenth of a second between two looks at the plan."""
+        """Let time pass, and look at the plan again and again."""
         left = seconds
         while left > 0:
             part = min(left, 0.02)

@@ -85,7 +85,7 @@ def test_a_generator_is_sent_thrown_into_and_closed_as_ever():
             yield 0.3
         finally:
             told.append("closed")
-        return "done"
+        return 0.4
 
     @shadow.frame
     def frame():
@@ -97,8 +97,8 @@ def test_a_generator_is_sent_thrown_into_and_closed_as_ever():
         assert told == ["hello", error, "closed"]
         return stopped.value.value
 
-    assert frame() == "done"
-    assert shadow.frames[0].calls["talk"].scores == [0.1, 0.2, 0.3]
+    assert frame() == 0.4
+    assert shadow.frames[0].calls["talk"].scores == [0.1, 0.2, 0.3, 0.4]
     assert shadow.frames[0].calls["talk"].complete
 
 
@@ -118,6 +118,21 @@ def test_a_score_that_fails_or_is_none_goes_no_further(system):
     worse = system.shadow.watch(abs, quality=lambda value: value)
     assert system.shadow.frame(lambda: (bad(), worse(-7)))() == (7, 7)
     assert system.shadow.odd["abs with a score that is none"] == 1
+
+
+def test_what_returns_nothing_has_what_it_registered():
+    shadow = Shadow()
+
+    def seek():
+        shadow.register(0.7)
+
+    def look():
+        yield 0.5
+
+    watched = [shadow.watch(each, quality=float) for each in (seek, look)]
+    shadow.frame(lambda: (watched[0](), list(watched[1]())))()
+    assert shadow.frames[0].calls["seek"].scores == [0.7]
+    assert shadow.frames[0].calls["look"].scores == [0.5]
 
 
 def test_of_many_results_all_times_are_covered_and_few_results_are_alive():

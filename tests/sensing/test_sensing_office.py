@@ -1,13 +1,18 @@
 """The office that ships with the project."""
 
+from pathlib import Path
+
 import numpy as np
 
-from experiments.office import GOAL, START, draw, read_office
-from sensing import connected
+import experiments
+from experiments.office import GOAL, START, draw
+from sensing import connected, read_map
+
+SHIPPED = Path(experiments.__file__).parent / "data" / "office.yaml"
 
 
 def test_the_files_that_ship_are_what_the_script_draws():
-    assert read_office() == draw()
+    assert read_map(SHIPPED) == draw()
 
 
 def test_there_is_room_to_walk_and_all_of_it_can_be_reached():
