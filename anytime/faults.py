@@ -121,6 +121,8 @@ def read_schedule(path: Path, known: Mapping[str, Iterable[str]]) -> Schedule:
     except ValueError as error:
         raise AnytimeError(f"{path}: {error}") from None
     for fault in faults:
+        if fault.what == "clock" and math.isinf(fault.ends):
+            raise AnytimeError(f"{path}: {fault.kind} has no end; say until when, `to`")
         if fault.what not in known:
             raise AnytimeError(
                 f"{path}: nothing called {fault.what!r}; there are {', '.join(known)}"
@@ -197,10 +199,11 @@ class FaultyClock(WorkClock):
     def __init__(self, machine: Machine, schedule: Schedule) -> None:
         super().__init__(machine)
         self._due = sorted(schedule.of("clock"), key=lambda fault: fault.begins)
+        self._schedule = schedule
 
     def _pass(self, seconds: float) -> None:
         super()._pass(seconds)
         while self._due and self.now() >= self._due[0].begins:
             fault = self._due.pop(0)
-            if math.isfinite(fault.ends):
+            if math.isfinite(fault.ends) and self._schedule.strikes("clock", fault.begins):
                 super()._pass(max(0.0, fault.ends - self.now()))

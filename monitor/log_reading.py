@@ -72,6 +72,12 @@ def read_log(path: Path | str) -> Log:
                     f"{path}:{number}: frame {line.index} follows {len(frames)} frames; a log "
                     "holds every frame in order"
                 )
+            before = frames[-1].started if frames else 0.0
+            if not before <= line.started <= line.ended < math.inf:
+                raise AnytimeError(
+                    f"{path}:{number}: frame {line.index} from {line.started} to {line.ended} s; "
+                    f"it must begin at {before} s or later, and end"
+                )
             _check_frame(line, mission, f"{path}:{number}")
             frames.append(line)
     if mission is None:

@@ -131,6 +131,14 @@ class Mission:
             number = getattr(self, name)
             if not is_number(number) or not 0 <= number < math.inf:
                 raise AnytimeError(f"{name} is {number!r}; it must be a finite number >= 0")
+        for name, number in self.fixed.items():
+            if not is_number(number) or not 0 <= number < math.inf:
+                raise AnytimeError(f"fixed.{name} is {number!r}; it must be a finite number >= 0")
+        slow, fast = self.speeds
+        if not slow <= self.fixed.get("speed", slow) <= fast:
+            raise AnytimeError(
+                f"fixed.speed is {self.fixed['speed']}; it must lie within speeds, {slow} to {fast}"
+            )
 
     def known(self, time: float) -> Mission:
         """The mission as it is known at a time, without what comes later."""

@@ -108,13 +108,14 @@ class _Life:
         self.frames: list[Frame] = []
         self.presented = robot.clock.now()
         self.promised = float("nan")
-        self.job = 0.0
+        self.job = self.driven_before = 0.0
         self.route = self.walked = self.walked_on = 0.0
         self.inputs: Mapping[str, Any] = {}
 
     def live(self) -> Ending:
         plan: Any = None
         made_on = 0.0
+        self.driven_before = self.robot.driven()
         while True:
             if self.told:
                 return Ending.ABORTED
@@ -360,8 +361,10 @@ class _Life:
     def report(self, ending: Ending, fault: str) -> Report:
         seconds = self.time()
         energy = sum(frame.energy for frame in self.frames)
+        driven = sum(frame.driven for frame in self.frames)
         try:
             energy = checked(self.robot.situation()).energy
+            driven = min(seconds, max(0.0, self.robot.driven() - self.driven_before))
         except Exception as error:  # then what is known of the frames that ended
             self.failures.note(str(Fault.of(error)))
         reached = ending is Ending.REACHED
@@ -375,6 +378,7 @@ class _Life:
             earned=float(self.mission.known(seconds).value(seconds)) if reached else 0.0,
             seconds=seconds,
             energy=energy,
+            driven=driven,
             job=self.job,
             frames=tuple(self.frames),
             machine=self.monitor.program.machine,

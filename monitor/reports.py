@@ -96,7 +96,8 @@ class Report:
 
     promised: net value computed when the task was presented, NaN without foresight.
     net: what it was really worth.
-    seconds: completion or ending time; energy used; job: seconds of work at the goal.
+    seconds: completion or ending time; energy used; driven: seconds in motion; job: seconds of work
+    at the goal.
     again: lives the mission again with (frame, shares, speed) changed; None where nobody can.
     """
 
@@ -109,6 +110,7 @@ class Report:
     earned: float
     seconds: float
     energy: float
+    driven: float
     job: float
     frames: tuple[Frame, ...]
     machine: str = ""
@@ -138,8 +140,8 @@ class Report:
     def ledger(self) -> dict[str, float]:
         """Where the time went: drive + wait + job is all of it; the rest is what thinking took."""
         spent: dict[str, float] = {
-            "drive": sum(frame.driven for frame in self.frames),
-            "wait": sum(frame.waited for frame in self.frames),
+            "drive": self.driven,
+            "wait": self.seconds - self.driven - self.job,
             "job": self.job,
         }
         for frame in self.frames:

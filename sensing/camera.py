@@ -26,7 +26,7 @@ _TILE = 512  # pixels a side of the tiles of noise and texture
 _SHADES = 255
 _OUTLIER = 3  # a pixel that differs from its neighbourhood by more standard deviations is defect
 _ROOM = 1.8  # deviations of noise from either shade to black or white, at least
-_MOST_EXPOSURES = 256  # 256 x 255 fits the uint16 accumulators
+MOST_EXPOSURES = 256  # 256 x 255 fits the uint16 accumulators
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class Camera:
                 f"obstacle {self.obstacle}, floor {self.floor}: it must be 0 <= obstacle < floor"
                 f" <= {_SHADES}"
             )
-        if not 1 <= self.first <= self.last <= _MOST_EXPOSURES:
+        if not 1 <= self.first <= self.last <= MOST_EXPOSURES:
             raise AnytimeError(
                 f"first {self.first}, last {self.last}: it must be 1 <= first <= last"
-                f" <= {_MOST_EXPOSURES}"
+                f" <= {MOST_EXPOSURES}"
             )
         if not (0 <= self.noise <= _SHADES and 0 <= self.texture <= _SHADES):
             raise AnytimeError("noise and texture must be standard deviations from 0 to 255")

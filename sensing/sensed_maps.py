@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -43,17 +42,9 @@ def disc(center: Cell, radius: int, shape: tuple[int, int]) -> Disc:
         raise AnytimeError(f"radius is {radius}: it must be 0 cells or more")
     top, left = max(row - radius, 0), max(column - radius, 0)
     bottom, right = min(row + radius + 1, rows), min(column + radius + 1, columns)
-    whole = _whole_disc(radius)
-    dy, dx = radius - row, radius - column
-    return Disc(top, left, whole[top + dy : bottom + dy, left + dx : right + dx])
-
-
-@lru_cache(maxsize=16)
-def _whole_disc(radius: int) -> BoolGrid:
-    step = np.arange(-radius, radius + 1)
-    inside = step[:, None] ** 2 + step**2 <= radius**2
-    inside.flags.writeable = False
-    return inside
+    down, across = np.arange(top, bottom) - row, np.arange(left, right) - column
+    reach = min(radius, rows + columns)  # from where on it holds all of the map
+    return Disc(top, left, down[:, None] ** 2 + across**2 <= reach**2)
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from sensing.vision import Vision
 
 SIZE = 40  # cells
 MISSION = Mission(Value("hard", 100.0, 400.0), Energy(0.1, 0.1, 0.02), job=1.0, name="faulty")
-CLOSED = 1e-3  # seconds a frame, within which the ledger must close
+CLOSED = 1e-3  # seconds within which the ledger must close
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +79,5 @@ def live(program: CompiledProgram, mission: FaultyMission) -> Lived:
         return Lived("", None, repr(error))
     ledger = report.ledger
     spent = ledger["drive"] + ledger["wait"] + ledger["job"]
-    frames = report.frames[-1].ended if report.frames else 0.0
-    missing = abs(spent - report.job - frames) - CLOSED * (1 + len(report.frames))
+    missing = max(abs(spent - report.seconds), -ledger["wait"]) - CLOSED
     return Lived(report.ending.value, report, unclosed=max(0.0, missing))

@@ -151,6 +151,8 @@ def run(options: argparse.Namespace) -> Answer:
         faults = read_schedule(options.faults, kinds_of(briefing.program))
         if options.clock == "work":
             clock = FaultyClock(grid.machine, faults)
+        elif faults.of("clock"):
+            raise AnytimeError(f"{options.faults}: faults of the clock take --clock work")
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed or 0, clock=clock, log=log, faults=faults)
     if options.regret:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from anytime.clocks import Clock
@@ -52,10 +53,12 @@ class FaultyRobot:
     def __init__(self, robot: Robot, schedule: Schedule) -> None:
         self.robot, self.schedule = robot, schedule
         self._origin = robot.clock.now()
+        self._bumped = False  # since it set out
 
     def __getattr__(self, name: str) -> Any:
         # What a robot can do beyond the protocol (`avoid`) it still can.
-        return getattr(self.robot, name)
+        found = getattr(self.robot, name)
+        return self._setting_out(found) if name == "avoid" else found
 
     @property
     def clock(self) -> Clock:
@@ -75,12 +78,21 @@ class FaultyRobot:
         found = self.robot.situation()
         if "bumps" in kinds and found.in_hand > 0:
             self.robot.stop()
-        return found
+            self._bumped = True
+            found = self.robot.situation()
+        return replace(found, interrupted=found.interrupted or self._bumped)
 
     def begin(self, plan: Any, speed: float) -> None:
         if "refuses" in self._struck():
             raise AnytimeError("the motors refuse, as it was scheduled")
-        self.robot.begin(plan, speed)
+        self._setting_out(self.robot.begin)(plan, speed)
+
+    def _setting_out(self, how: Callable[..., None]) -> Callable[..., None]:
+        def anew(*asked: Any) -> None:
+            self._bumped = False
+            how(*asked)
+
+        return anew
 
     def change_speed(self, speed: float) -> None:
         self._struck()

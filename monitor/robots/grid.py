@@ -71,6 +71,8 @@ class Scene:
                     f"{name} ({row}, {column}) is inside an obstacle of the map {self.name!r}; "
                     "choose a free cell"
                 )
+        if not 0 < self.density < 1:
+            raise AnytimeError(f"density is {self.density}; it must be more than 0, less than 1")
         if self.radius < 2 or not 1 <= self.frame <= self.radius / 2:
             raise AnytimeError(
                 f"frame {self.frame} and radius {self.radius}: a frame is 1 cell to half the radius"
@@ -147,9 +149,12 @@ class GridRobot:
     def at(self) -> Cell:
         """The cell where the robot is now."""
         self._settle()
-        index = int(np.searchsorted(self._along, self._done + 1e-9, side="right")) - 1
-        row, column = self._path[index]
+        row, column = self._path[self._reached()]
         return int(row), int(column)
+
+    def _reached(self) -> int:
+        """The place on its path of the last cell that it came to."""
+        return int(np.searchsorted(self._along, self._done + 1e-9, side="right")) - 1
 
     def learn(self, plan: FramePlan | NoWay) -> None:
         """Take over the belief that the plan was made with; what was touched since stays known."""
@@ -219,8 +224,14 @@ class GridRobot:
         self._settle()
 
     def stop(self) -> None:
+        """Stand still where it is; a plan in execution is broken off there."""
         self._settle()
-        self._plan = None
+        if self._plan is None:
+            return
+        walked = self._reached() + 1
+        self._path, self._along = self._path[:walked], self._along[:walked]
+        self._done = float(self._along[-1])
+        self._arrive()
 
     def driven(self) -> float:
         self._settle()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +18,8 @@ from monitor.robots.grid import Scene
 from planners.path_finding import Cell
 from planners.touring import MOST_GOALS
 from sensing import corner_to_corner, read_map
-from sensing.camera import Camera
+from sensing.camera import MOST_EXPOSURES, Camera
+from sensing.maps import BoolGrid
 from sensing.vision import Device, Vision
 
 
@@ -122,10 +124,8 @@ def read_mission(
         raise AnytimeError(f"{path}: world: it has a goal and goals; give one of them")
     named = file.world.goals or ((file.world.goal,) if file.world.goal else ())
     ends = tuple(goals) or (() if replaced else named)
-    if begin is None or not ends:
-        corners = corner_to_corner(_largest_component(floor.free))
-        begin, ends = begin or corners[0], ends or corners[1:]
     try:
+        begin, ends = _ends(floor.free, begin, ends)
         scene = Scene(
             free=floor.free,
             start=begin,
@@ -162,7 +162,10 @@ def read_mission(
 def _news(table: _News | None) -> News | None:
     if table is None:
         return None
-    value = Value(table.kind, table.worth, table.seconds)  # pyright: ignore[reportArgumentType]
+    try:
+        value = Value(table.kind, table.worth, table.seconds)  # pyright: ignore[reportArgumentType]
+    except AnytimeError as error:
+        raise AnytimeError(str(error).replace("value.", "news.", 1)) from None
     return News(table.at, value)
 
 
@@ -178,15 +181,40 @@ def _device(vision: _Vision) -> Device:
             vision.t_a, vision.t_b, vision.q_a, vision.q_b, vision.concave, vision.falloff
         )
     if vision.kind == "camera":
+        if not Camera().first <= vision.exposures <= MOST_EXPOSURES:
+            raise AnytimeError(
+                f"vision.exposures is {vision.exposures}; a camera makes {Camera().first} to "
+                f"{MOST_EXPOSURES}"
+            )
         return replace(Camera(), last=vision.exposures)
     raise AnytimeError(f"vision.kind is {vision.kind!r}; it must be parametric or camera")
 
 
-def _largest_component(free: np.ndarray) -> np.ndarray:
-    """The free cells of the largest connected part of a floor."""
-    from scipy.ndimage import label
-
+def _ends(
+    free: BoolGrid, start: Cell | None, goals: tuple[Cell, ...]
+) -> tuple[Cell, tuple[Cell, ...]]:
+    """Start and goals, those that are not given far off: in the corners of the part of the floor in
+    which the given ones lie, or of its largest part."""
+    if start is not None and goals:
+        return start, goals
     if not free.any():
         raise AnytimeError("the map has no free cell")
+    given = start or (goals[0] if goals else None)
+    first, last = corner_to_corner(_part(free, given))
+    if given is None:
+        return first, (last,)
+    far = max(first, last, key=lambda cell: math.dist(cell, given))
+    return start or far, goals or (far,)
+
+
+def _part(free: BoolGrid, cell: Cell | None) -> BoolGrid:
+    """The free cells that hang together with a cell, or the largest part of a floor without one;
+    all of them for a cell that is not on the floor."""
+    from scipy.ndimage import label
+
     parts = np.asarray(label(free)[0])  # pyright: ignore[reportIndexIssue]
-    return parts == 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
+    if cell is None:
+        return parts == 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
+    rows, columns = free.shape
+    on_floor = 0 <= cell[0] < rows and 0 <= cell[1] < columns and free[cell]
+    return parts == parts[cell] if on_floor else free

@@ -146,6 +146,10 @@ class _File(_Section):
     obstacle: list[_Obstacle] = msgspec.field(default_factory=list)
 
 
+_OWN = {"goal", "nao", "sonar", "noise", "obstacle"}
+"""Tables that only a scene has."""
+
+
 def read_scene(path: Path, *, seed: int | None = None, noise: bool = True) -> Scene:
     """Read a scene; `seed` replaces the file's, `noise=False` turns off all that is random.
 
@@ -173,12 +177,12 @@ def read_scene(path: Path, *, seed: int | None = None, noise: bool = True) -> Sc
 
 
 def is_scene(path: Path) -> bool:
-    """Whether a TOML file is about a NAO rather than a grid mission: it has a goal in metres."""
+    """Whether a TOML file is about a NAO rather than a grid mission: by the tables that it has."""
     try:
-        goal = tomllib.loads(path.read_text(encoding="utf-8")).get("goal")
+        tables = tomllib.loads(path.read_text(encoding="utf-8")).keys()
     except (OSError, ValueError, RecursionError):  # whoever reads it in earnest says what is wrong
         return False
-    return isinstance(goal, dict) and "at" in goal
+    return bool(tables & _OWN) and not tables & {"mission", "value", "world"}
 
 
 def _obstacle(number: int, given: _Obstacle) -> Obstacle:

@@ -14,6 +14,7 @@ Vector = tuple[float, float]
 
 _ROBOT, _OBSTACLE = 1, 2
 _MASS = 5.4  # kg, of a NAO
+_WIDEST = 1e4  # metres of an obstacle: squares of it stay numbers
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,10 @@ class Obstacle:
         if (self.radius is None) == (self.size is None):
             raise AnytimeError("an obstacle is a disc or a box; give one of the two")
         lengths = (self.radius,) if self.radius is not None else self.size or ()
-        if not all(0.0 < length < math.inf for length in lengths):
-            raise AnytimeError(f"an obstacle's lengths are {lengths}; they must be > 0 and finite")
+        if not all(0.0 < length <= _WIDEST for length in lengths):
+            raise AnytimeError(
+                f"an obstacle's lengths are {lengths}; they must be > 0 and at most {_WIDEST:g} m"
+            )
         if not all(map(math.isfinite, (*self.at, self.turned, *self.velocity))):
             raise AnytimeError(f"an obstacle at {self.at}: place and velocity must be finite")
         if not 0.0 <= self.appears < self.vanishes:

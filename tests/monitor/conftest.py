@@ -66,6 +66,7 @@ def made_up_report(frames: int = 6, policy: str = "expected", seed: int = 3) -> 
         earned=earned,
         seconds=seconds,
         energy=energy,
+        driven=sum(frame.driven for frame in told),
         job=0.0,
         frames=tuple(told),
         machine="reference",

@@ -66,6 +66,26 @@ def test_a_module_that_fails_three_times_is_asked_no_more():
     assert len(faults) == 3
 
 
+def test_a_robot_that_bumps_stands_where_it_was_and_plans_anew():
+    report = live(Fault("bumps", begins=3.0, ends=9.0, what="robot", chance=0.3))
+    walks = [frame.story["path"] for frame in report.frames]
+    assert [walk[0] for walk in walks[1:]] == [walk[-1] for walk in walks[:-1]]
+    for frame in report.frames:
+        walked = frame.driven * frame.moments[-1].decision.speed
+        assert frame.story["length"] <= walked + 1e-6 <= frame.story["length"] + 2**0.5 + 1e-6
+    assert any(frame.interrupted for frame in report.frames)
+    assert report.ending is Ending.REACHED
+    assert "asked no more" not in report.fault
+
+
+def test_the_ledger_of_a_mission_that_is_cut_in_a_frame_closes():
+    report = live(Fault("link", begins=3.3, what="robot"))
+    assert report.frames[-1].ended < report.seconds
+    ledger = report.ledger
+    assert ledger["drive"] + ledger["wait"] + ledger["job"] == pytest.approx(report.seconds)
+    assert ledger["wait"] >= 0
+
+
 def test_the_ledger_of_a_faulty_mission_closes():
     for number in range(30):
         outcome = faulty_missions.live(PROGRAM, faulty_missions.drawn(PROGRAM, number, 0))
@@ -328,6 +348,7 @@ def test_faults_are_read_from_a_file(tmp_path):
         '[[fault]]\nwhat = "see"\nkind = "raises"\nfrom = 3\nto = 2',
         '[[fault]]\nwhat = "see"\nkind = "raises"\nchance = 2.0',
         '[[fault]]\nwhat = "see"\nkind = "raises"\nnan = nan',
+        '[[fault]]\nwhat = "clock"\nkind = "suspended"\nfrom = 3',
         "\x00",
     ],
 )

@@ -5,6 +5,7 @@ import pytest
 from anytime import AnytimeError
 from experiments import shipped
 from monitor.robots.grid_missions import read_mission
+from sensing.sensed_maps import disc
 
 GOOD = shipped.mission_path().read_text()
 
@@ -37,6 +38,10 @@ def test_the_shipped_mission_is_read():
         ("see = 0.25", "see = -1.0", "rate"),
         ("find_path = 0.001", "find_a_path = 0.001", "find_a_path"),
         ("speed = 7.499", "velocity = 7.499", "velocity"),
+        ("speed = 7.499", "speed = nan", "fixed.speed is nan"),
+        ("speed = 7.499", "speed = 750.0", "within speeds"),
+        ("frame = 16.0", "frame = 16.0\ndensity = 1.0", "density is 1.0"),
+        ('kind = "parametric"', 'kind = "camera"\nexposures = 2', "vision.exposures is 2"),
         ("[value]", "[value", "not TOML"),
         ("price = 0.2", f"price = {'9' * 5000}", "not TOML"),
         ("price = 0.2", f"price = {'[' * 5000}", "not TOML"),
@@ -89,3 +94,22 @@ def test_news_is_read_and_a_time_that_is_none_is_refused(tmp_path):
     assert (mission.known(0.0).value.kind, mission.known(30.0).value.kind) == ("soft", "hard")
     with pytest.raises(AnytimeError, match=r"news\.at is -1\.0; it must be a finite number > 0"):
         read_mission(written(tmp_path, GOOD + news.replace("20.0", "-1.0")))
+
+
+def test_the_end_that_is_not_given_lies_far_off_in_the_same_part(tmp_path):
+    (tmp_path / "two.map").write_text("type octile\nheight 2\nwidth 9\nmap\n...@.....\n...@.....\n")
+    text = GOOD.replace('"../office.yaml"', '"two.map"').replace("frame = 16.0", "frame = 2.0")
+    file = tmp_path / "m.toml"
+    file.write_text(text.replace("start = [30, 8]\n", "").replace("goal = [148, 228]\n", ""))
+    scene = read_mission(file).scene
+    assert (scene.start, scene.goal) == ((0, 4), (1, 8))
+    assert read_mission(file, start=(1, 2)).scene.goal == (0, 0)
+    assert read_mission(file, goals=[(0, 4)]).scene.start == (1, 8)
+
+
+def test_what_is_seen_of_a_small_floor_does_not_grow_with_the_radius(tmp_path):
+    text = GOOD.replace("radius = 32", "radius = 1000000000000")
+    assert read_mission(written(tmp_path, text)).scene.radius == 10**12
+    seen = disc((2, 3), 10**30, (20, 30))
+    assert seen.inside.all()
+    assert seen.inside.shape == (20, 30)

@@ -188,6 +188,16 @@ def test_what_the_page_would_fall_over_is_refused_when_it_is_read(
         read_log(path)
 
 
+@pytest.mark.parametrize("started", ["1e999", "-5"])
+def test_a_frame_at_a_time_that_cannot_be_is_refused(tmp_path, mission, floor, report, started):
+    path = write_log(tmp_path / "a.jsonl", mission, floor, report)
+    line = json.loads(path.read_text().splitlines()[2])
+    told = json.dumps(line | {"started": "here"}).replace('"here"', started)
+    changed(path, 3, told)
+    with pytest.raises(AnytimeError, match="it must begin at"):
+        read_log(path)
+
+
 def test_an_empty_file_and_no_file_are_no_logs(tmp_path):
     (tmp_path / "empty.jsonl").touch()
     with pytest.raises(AnytimeError, match="first line must be the mission"):

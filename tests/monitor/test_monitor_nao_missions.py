@@ -71,6 +71,9 @@ def test_the_command_tells_a_scene_from_a_grid_mission(tmp_path, capsys):
     assert is_scene(SCENES / "sitting.toml")
     assert not is_scene(ROOT / "experiments" / "data" / "missions" / "office.toml")
     assert not is_scene(tmp_path / "nothing.toml")
+    (tmp_path / "m.toml").write_text("[goal]\nvelocity = [0.1, 0.0]\n")
+    assert main(["run", str(tmp_path / "m.toml")]) == 2
+    assert "missing required field `at`" in capsys.readouterr().err
     code = main(["run", str(SCENES / "removed_early.toml"), "--log", str(tmp_path), "--json"])
     assert code == 0
     assert '"ending": "reached"' in capsys.readouterr().out

@@ -126,6 +126,7 @@ def test_one_source_of_noise_can_be_switched_off_alone(tmp_path):
         ("disc = [0.5, 0.0, 0.1]", "disc = [0.5, 0.0, -0.1]", "obstacle 1.*lengths"),
         ("disc = [0.5, 0.0, 0.1]", "box = [0.5, 0.0, 0.1, inf]", "obstacle 1.*lengths"),
         ("disc = [0.5, 0.0, 0.1]", "disc = [0.5, 0.0, 0.1]\nfrom = 3\nuntil = 2", "vanishes"),
+        ("disc = [0.5, 0.0, 0.1]", "box = [0.6, 30.0, 1e300, 1.0]", "at most 10000 m"),
         ("disc = [0.5, 0.0, 0.1]", "disc = [0.5, 0.0, 0.1]\nfrom = nan", "appears"),
         ("disc = [0.5, 0.0, 0.1]", "disc = [0.5, 0.0, 0.1]\nvelocity = [9, 0]", "1 m/s"),
         ("disc = [0.5, 0.0, 0.1]", "disc = [0.5, 0.0, 0.1]\nspeed = 1", "speed"),
