@@ -50,7 +50,7 @@ class Robot(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stand still; never fails."""
+        """Stand still where it is; never fails."""
         ...
 
     def driven(self) -> float:
