@@ -183,7 +183,10 @@ def compare_sides(options: argparse.Namespace) -> Answer:
     from monitor.robots.comparing import compare
     from monitor.robots.grid_missions import read_mission
     from monitor.robots.lessons import user_memory
+    from monitor.robots.nao_scenes import is_scene
 
+    if is_scene(options.mission):
+        raise AnytimeError(f"{options.mission} is a NAO's scene; compare takes a grid mission")
     grid = read_mission(options.mission)
     with progress("living the mission"):
         found = compare(

@@ -33,10 +33,14 @@ def compare(
     before, after: folders of profiles, or files that `anytime compile` wrote. tolerance: the loss
     of net value that is put up with. memory: where what the missions lived teach is kept. Missions
     are lived with what was before; where none of them reaches its goal, with what came after.
-    Raises AnytimeError if no mission reaches its goal with either, for a path that is not there,
-    for two of different kinds, and for programs of other modules.
+    Raises AnytimeError if no mission reaches its goal with either, or it begins there, for a path
+    that is not there, for two of different kinds, and for programs of other modules.
     """
     grid = replace(grid, mission=grid.mission.known(0.0))  # judged as it is presented
+    if grid.scene.optimal == 0:
+        raise AnytimeError(
+            f"the mission {grid.mission.name!r} begins at its goal; nothing is to be divided there"
+        )
     for path in (before, after):
         if not path.exists():
             raise AnytimeError(f"{path}: no such file or folder")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anytime import Machine
+from anytime import AnytimeError, Machine
 from anytime.__main__ import main
 from compiler import compile
 from experiments import shipped
@@ -117,6 +117,15 @@ def test_the_command_refuses_what_cannot_be_compared_in_one_line(tmp_path, capsy
         told = capsys.readouterr()
         assert (code, told.out, told.err.count("\n")) == (2, "", 1)
         assert says in told.err
+
+
+def test_a_mission_without_anything_to_divide_is_refused(tmp_path, capsys):
+    there = Scene(np.ones((8, 8), bool), (2, 2), (2, 2), radius=4, frame=2.0)
+    with pytest.raises(AnytimeError, match="begins at its goal"):
+        compare(tmp_path, tmp_path, GridMission(MISSION, there, shipped.profiles().machine))
+    scene = shipped.DATA / "scenes" / "sitting.toml"
+    assert main(["compare", str(tmp_path), str(tmp_path), "--mission", str(scene)]) == 2
+    assert "takes a grid mission" in capsys.readouterr().err
 
 
 def test_modules_live_at_the_rates_of_simulated_time_and_not_at_those_of_another_computer():
