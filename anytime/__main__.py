@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import io
 import os
@@ -42,11 +43,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"anytime: {error}".replace("\n", " "), file=sys.stderr)
         return 2
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 0
     except OSError as error:
         if not error.filename and error.errno not in NO_ROOM:
             return _bug(error)
+        if not error.filename:
+            _drop_output()
         place = error.filename2 or error.filename or "standard output"
         print(f"anytime: {place}: {error.strerror or error}", file=sys.stderr)
         return 2
@@ -56,6 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Exception as error:
         return _bug(error)
     return answer.code
+
+
+def _drop_output() -> None:
+    """Let what could not be printed go nowhere, or it would be tried once more at the end."""
+    with contextlib.suppress(OSError):  # a stand-in for standard output has no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _bug(error: Exception) -> int:

@@ -18,7 +18,7 @@ EQUIVALENT: dict[str, dict[tuple[str, str], str]] = {
         ): _WORK,
         ("SWEEPS = 4  # of pairwise exchange at each budget, at most", "4 → 5"): _WORK,
         (
-            "BUDGETS = 24  # at which programs of more than two calls are searched",
+            "BUDGETS = 24  # at which programs of more divisions are searched",
             "24 → 25",
         ): _WORK,
         ("if cells <= ALL:", "LtE → Lt"): _WORK,

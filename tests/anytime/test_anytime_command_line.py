@@ -172,9 +172,13 @@ def test_a_bug_of_ours_is_one_line_with_the_path_of_a_report(monkeypatch, capsys
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
 def test_a_full_device_is_one_line():
     command = f"{sys.executable} -m anytime doctor --seconds 0.01 > /dev/full"
-    told = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
-    assert told.returncode == 2
-    assert told.stderr.strip() == "anytime: standard output: No space left on device"
+    for unbuffered in ("", "1"):
+        environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        told = subprocess.run(
+            ["sh", "-c", command], env=environment, capture_output=True, text=True, check=False
+        )
+        assert told.returncode == 2
+        assert told.stderr.strip() == "anytime: standard output: No space left on device"
 
 
 def test_modules_that_raise_after_a_result_or_that_nothing_reaches_are_told(tmp_path, capsys):
