@@ -86,9 +86,8 @@ def measure(
     """Measure the claims of the parts, each in the paper's way and in ours, and draw pictures.
 
     parts: names of files here, which hold `CLAIMS`, `draw` and `animate`. A draw of all claims is
-    one seed; the same seeds serve both ways. What is found is kept beside the page as it comes;
-    resume: go on from there, else it makes way for the first
-    new finding.
+    one seed; the same seeds serve both ways. What is found is kept beside the page as it comes.
+    resume: go on from there; else what is there makes way for the first new finding.
     """
     modules = {
         part: importlib.import_module(f"experiments.reproduction.{part}")
