@@ -12,18 +12,20 @@ from compiler import CompiledProgram
 from monitor.missions import Mission
 from monitor.states import Decision, Why
 
-FAILURES = 3  # faults of a module in a mission, or frames in a row without a plan
+FAILURES = 3  # faults of a module in a mission, or frames in a row without a plan to execute
 
 
 @dataclass
 class Failures:
     """What has failed in a mission so far.
 
-    faults: by call. fruitless: frames in a row without a plan. notes: what to tell of it.
+    faults: by call. fruitless: frames in a row without a plan. refused: plans in a row that the
+    robot did not begin. notes: what to tell of it.
     """
 
     faults: dict[str, int] = field(default_factory=dict[str, int])
     fruitless: int = 0
+    refused: int = 0
     notes: list[str] = field(default_factory=list[str])
 
     def count(self, label: str, result: Result) -> None:
@@ -36,6 +38,12 @@ class Failures:
         self.faults[label] = self.faults.get(label, 0) + 1
         if self.faults[label] == FAILURES:
             self.note(f"{label} failed {FAILURES} times and is asked no more: {reason}")
+
+    def refuse(self, reason: str) -> None:
+        """The robot has not begun a plan. Who made it is asked again: it may be the robot."""
+        self.refused += 1
+        if self.refused == FAILURES:
+            self.note(f"the robot refused {FAILURES} plans in a row: {reason}")
 
     def note(self, text: str) -> None:
         """Keep something to tell, once."""
@@ -50,7 +58,7 @@ class Failures:
     @property
     def no_plan_in_sight(self) -> bool:
         """Whether it is time to go without one."""
-        return self.quarantined or self.fruitless >= FAILURES
+        return self.quarantined or max(self.fruitless, self.refused) >= FAILURES
 
 
 def unsound(decision: Decision, labels: Sequence[str]) -> str:

@@ -140,22 +140,21 @@ class _Life:
                 return Ending.BLOCKED
 
     def set_out(self, plan: Any) -> bool:
-        """Begin to execute a plan, or to go without one when none is in sight; whether it moves.
-
-        A plan that the robot refuses is a failure of the call that made it.
-        """
+        """Begin to execute a plan, or to go without one when none is in sight; whether it moves."""
         speed = self.mission.speeds[0]
         if plan is not None:
             try:
                 self.robot.begin(plan, speed)
             except NO_PLAN as error:
-                self.failures.blame(self.monitor.program.program.output.label, str(Fault.of(error)))
+                self.failures.refuse(str(Fault.of(error)))
             else:
+                self.failures.refused = 0
                 return True
         avoid = getattr(self.robot, "avoid", None)  # see `monitor.bodies.Reactive`
         if not self.failures.no_plan_in_sight or avoid is None:
             return False
         avoid(speed)
+        self.failures.refused = 0
         return True
 
     def decide(self, state: State) -> Decision:

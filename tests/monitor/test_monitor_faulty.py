@@ -78,6 +78,20 @@ def test_a_robot_that_bumps_stands_where_it_was_and_plans_anew():
     assert "asked no more" not in report.fault
 
 
+def test_motors_that_refuse_for_a_while_end_nobodys_service():
+    report = live(Fault("refuses", begins=4.0, ends=12.0, what="robot"))
+    assert report.ending is Ending.REACHED
+    assert "asked no more" not in report.fault
+    last = report.frames[-2]
+    assert {call.label for call in last.calls} == set(PROGRAM.labels)
+
+
+def test_motors_that_always_refuse_leave_it_to_avoidance():
+    report = live(Fault("refuses", what="robot"))
+    assert report.ending is Ending.REACHED
+    assert "the robot refused 3 plans in a row" in report.fault
+
+
 def test_the_ledger_of_a_mission_that_is_cut_in_a_frame_closes():
     report = live(Fault("link", begins=3.3, what="robot"))
     assert report.frames[-1].ended < report.seconds
