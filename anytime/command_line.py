@@ -192,5 +192,6 @@ def told() -> Iterator[list[str]]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
+        warnings.simplefilter("ignore", DeprecationWarning)  # of packages, to their authors
         warnings.showwarning = tell
         yield lines
