@@ -142,9 +142,7 @@ def run(options: argparse.Namespace) -> Answer:
     grid = read_mission(options.mission, map_path=options.map, start=start, goals=goals)
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
-    with progress("calibrating"):
-        briefing = brief(grid, library, memory=user_memory())
-        monitor = briefing.monitor(options.policy)
+    briefing = brief(grid, library, memory=user_memory())
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
     faults = None
     if options.faults is not None:
@@ -153,6 +151,8 @@ def run(options: argparse.Namespace) -> Answer:
             clock = FaultyClock(grid.machine, faults)
         elif faults.of("clock"):
             raise AnytimeError(f"{options.faults}: faults of the clock take --clock work")
+    with progress("calibrating"):
+        monitor = briefing.monitor(options.policy)
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed or 0, clock=clock, log=log, faults=faults)
     if options.regret:
@@ -161,8 +161,9 @@ def run(options: argparse.Namespace) -> Answer:
             found = regrets(report, grid.mission, shares, count=options.regret, progress=bar)
         log_regrets(log, found)
     page = write_page([read_log(log)], options.log / "mission.html")
+    purpose = f"faults on purpose, by {options.faults}\n" if faults is not None else ""
     return Answer(
-        f"{report!r}\n{_wide(grid)}\nlog {log}, page {page}",
+        f"{report!r}\n{purpose}{_wide(grid)}\nlog {log}, page {page}",
         {
             "ending": report.ending.value,
             "net": report.net,

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from anytime import AnytimeError, WorkClock
+from anytime.__main__ import main
 from anytime.faults import CLOCK, MODULE, Fault, FaultyClock, Schedule, read_schedule
 from experiments import crossings
 from experiments.benchmarks import faulty_missions
@@ -381,6 +382,15 @@ def test_a_mission_file_cannot_bring_faults_of_its_own(tmp_path):
     mission.write_text(text)
     with pytest.raises(AnytimeError, match="fault"):
         read_mission(mission, map_path=path.parent.parent / "office.yaml")
+
+
+def test_real_time_is_not_suspended_on_purpose(tmp_path, capsys):
+    from experiments import shipped
+
+    text = '[[fault]]\nwhat = "clock"\nkind = "suspended"\nfrom = 1\nto = 2\n'
+    faults = ["--faults", str(faults_file(tmp_path, text)), "--clock", "wall"]
+    assert main(["run", str(shipped.mission_path()), "--log", str(tmp_path), *faults]) == 2
+    assert "take --clock work" in capsys.readouterr().err
 
 
 def test_a_mission_that_is_killed_leaves_a_log_that_reads():
