@@ -51,7 +51,7 @@ def drawn(program: CompiledProgram, number: int, seed: int) -> FaultyMission:
     floor = crossings.crossing(
         kind, number, reachable=bool(rng.random() < 0.9), seed=seed, size=SIZE
     )
-    kinds = kinds_of(program)
+    kinds = kinds_of(program.program)
     faults: list[Fault] = []
     for _ in range(int(rng.integers(1, 4))):
         what = str(rng.choice(list(kinds)))

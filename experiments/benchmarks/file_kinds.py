@@ -96,7 +96,7 @@ def all_kinds(folder: Path) -> Iterator[Kind]:
     yield toml("scene.toml", data / "scenes" / "appearing.toml", read_scene)
     faults = folder / "faults.toml"
     faults.write_text('seed = 1\n[[fault]]\nwhat = "see"\nkind = "raises"\nfrom = 1.0\nto = 2.0\n')
-    yield toml("faults.toml", faults, lambda path: read_schedule(path, kinds_of(program)))
+    yield toml("faults.toml", faults, lambda path: read_schedule(path, kinds_of(program.program)))
     floor = "type octile\nheight 6\nwidth 7\nmap\n" + ".......\n" * 5 + "..@@..T\n"
     yield words("map", floor, read_map)
     query = "0\troom.map\t7\t6\t0\t0\t5\t4\t6.65685425\n"

@@ -113,6 +113,7 @@ def run(options: argparse.Namespace) -> Answer:
     from monitor.robots.grid_missions import read_mission
     from monitor.robots.lessons import user_memory
     from monitor.robots.nao_scenes import is_scene
+    from monitor.robots.navigation import navigate
 
     if is_scene(options.mission):
         if options.faults is not None:
@@ -142,16 +143,16 @@ def run(options: argparse.Namespace) -> Answer:
     grid = read_mission(options.mission, map_path=options.map, start=start, goals=goals)
     profiles = options.library or Path(str(files("experiments") / "data" / "profiles"))
     library = ProfileLibrary(profiles)
-    briefing = brief(grid, library, memory=user_memory())
     clock = WallClock() if options.clock == "wall" else WorkClock(grid.machine)
     faults = None
     if options.faults is not None:
-        faults = read_schedule(options.faults, kinds_of(briefing.program))
+        faults = read_schedule(options.faults, kinds_of(navigate))
         if options.clock == "work":
             clock = FaultyClock(grid.machine, faults)
         elif faults.of("clock"):
             raise AnytimeError(f"{options.faults}: faults of the clock take --clock work")
     with progress("calibrating"):
+        briefing = brief(grid, library, memory=user_memory())
         monitor = briefing.monitor(options.policy)
     log = options.log / "mission.jsonl"
     report = briefing.live(monitor, options.seed or 0, clock=clock, log=log, faults=faults)

@@ -9,6 +9,7 @@ from typing import Any
 from anytime.clocks import Clock
 from anytime.errors import AnytimeError
 from anytime.faults import CLOCK, MODULE, Schedule, faulty_module
+from anytime.programs import Program
 from compiler import CompiledProgram
 from compiler.rebinding import rebound
 from monitor.bodies import Robot
@@ -28,9 +29,9 @@ LOG = {"full": "a frame cannot be written"}
 """What may go wrong with a log."""
 
 
-def kinds_of(program: CompiledProgram) -> dict[str, dict[str, str]]:
+def kinds_of(program: Program) -> dict[str, dict[str, str]]:
     """What may go wrong in a mission: by what is faulty, the kinds and what they mean."""
-    modules = {call.module.name: MODULE for call in program.program.calls}
+    modules = {call.module.name: MODULE for call in program.calls}
     return {**modules, "robot": ROBOT, "clock": CLOCK, "log": LOG}
 
 

@@ -349,7 +349,7 @@ def faults_file(folder: Path, text: str) -> Path:
 
 def test_faults_are_read_from_a_file(tmp_path):
     text = 'seed = 4\n[[fault]]\nwhat = "see"\nkind = "raises"\nfrom = 1\nto = 2.5\nchance = 0.5\n'
-    schedule = read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM))
+    schedule = read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM.program))
     assert schedule.faults == (Fault("raises", 1.0, 2.5, "see", 0.5),)
     assert schedule.seed == 4
 
@@ -369,7 +369,7 @@ def test_faults_are_read_from_a_file(tmp_path):
 )
 def test_a_file_that_tells_of_no_fault_is_refused_in_one_line(tmp_path, text):
     with pytest.raises(AnytimeError) as refused:
-        read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM))
+        read_schedule(faults_file(tmp_path, text), kinds_of(PROGRAM.program))
     assert "\n" not in str(refused.value)
 
 
